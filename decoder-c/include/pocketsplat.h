@@ -236,7 +236,7 @@ enum psb_status psb_preview(const uint8_t *bundle,
                             struct psb_camera *camera,
                             struct psb_message *message);
 
-// Carries a camera by an angle, radians, around the upright axis through what it looks at.
+// Carries a camera by an angle, radians, at most 8192 in size, around the upright axis through what it looks at.
 //
 // turned may be camera itself. message: NULL, or where to say what was wrong.
 //

@@ -70,7 +70,7 @@ pub unsafe extern "C" fn psb_preview(
     status_of(outcome, message)
 }
 
-/// Carries a camera by an angle, radians, around the upright axis through what it looks at.
+/// Carries a camera by an angle, radians, at most 8192 in size, around the upright axis through what it looks at.
 ///
 /// turned may be camera itself. message: NULL, or where to say what was wrong.
 ///
@@ -89,6 +89,10 @@ pub unsafe extern "C" fn psb_orbit(
     let turned = unsafe { turned.as_mut() };
     let outcome = (|| {
         let camera = camera.ok_or(Failure::Misuse("camera is NULL"))?.to_core()?;
+        let most = pocketsplat_core::Camera::MAX_ANGLE;
+        if !(-most..=most).contains(&angle) {
+            return Err(Failure::Misuse("angle is no number from -8192 to 8192"));
+        }
         *turned.ok_or(Failure::Misuse("turned is NULL"))? = camera.orbited(angle).into();
         Ok(())
     })();

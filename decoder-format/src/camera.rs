@@ -29,6 +29,9 @@ pub struct Camera {
 }
 
 impl Camera {
+    /// The largest angle, in size, that [`Camera::orbited`] turns by, radians: [`sin_cos`] is exact up to it.
+    pub const MAX_ANGLE: f32 = 8192.0;
+
     /// The same camera with its frame scaled to `width_px × height_px`.
     ///
     /// ```
@@ -72,7 +75,7 @@ impl Camera {
     /// coordinate axis of the normalised frame to which the camera's up is nearest, either way round; p is the point of the
     /// camera's line of sight nearest to the origin, which the training cameras surround. Distance, height and what is in
     /// the middle of the image stay: of cameras that look at one point it is the circle that the manifest's orbit takes.
-    /// Sine and cosine are [`sin_cos`]'s, so every machine gets the same bits.
+    /// Sine and cosine are [`sin_cos`]'s, so every machine gets the same bits. Angles are at most [`Camera::MAX_ANGLE`] in size.
     ///
     /// ```
     /// # use pocketsplat_format::{Camera, Rotation};

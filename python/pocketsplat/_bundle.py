@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import os
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, TypedDict
@@ -16,6 +17,12 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from ._native import Limits
+
+# What the decoder counts with.
+_U8, _U16 = (1 << 8) - 1, (1 << 16) - 1
+
+# The process whose threads draw.
+_drawing_pid: int | None = None
 
 Quality = Literal["exact", "balanced", "draft"]
 
@@ -176,7 +183,8 @@ class Bundle:
         Several cameras of one size give [n, height, width, 3], on all cores. Without a camera it is the preview's picture.
         With `ram` the picture is that of a device with so much memory, which may leave out tiers.
 
-        Raises BundleError for a camera that cannot be drawn, BudgetError where no plan fits `ram`.
+        Raises BundleError for a camera that cannot be drawn, BudgetError where no plan fits `ram`, RuntimeError for several cameras in a
+        process that was forked from one that had drawn several.
         """
         import numpy
 
@@ -188,6 +196,8 @@ class Bundle:
             raise ValueError(f"cameras of {len(sizes)} sizes; needed: one size, of at least one camera")
         (width, height) = sizes.pop()
         limits = self._limits((width, height), ram, tiers, quality)
+        if len(cameras) > 1:
+            _check_threads()
         pixels = self._native.render([_as_tuple(each) for each in cameras], limits)
         pictures = numpy.frombuffer(pixels, dtype=numpy.uint8).reshape(len(cameras), height, width, 3)
         return pictures[0] if isinstance(camera, Camera) else pictures
@@ -196,9 +206,12 @@ class Bundle:
         """The Gaussians that a camera sees, as the heads make them for it; without a camera the preview's.
 
         They lie in the normalised frame, like the camera. How gsplat draws them stands in the package's README.
+
+        Raises BundleError for a camera that cannot be drawn, RuntimeError as `render` does.
         """
         import numpy
 
+        _check_threads()
         arrays = self._native.gaussians(_as_tuple(camera or self.preview))
         means, quats, scales, opacities, colors = (numpy.frombuffer(part, dtype="<f4") for part in arrays)
         return {
@@ -217,6 +230,9 @@ class Bundle:
         if size is None:
             preview = self.preview
             size = (preview.width_px, preview.height_px)
+        for name, number, most in (("width", size[0], _U16), ("height", size[1], _U16), ("tiers", tiers, _U8), ("ram", ram, sys.maxsize)):
+            if number is not None and not 0 <= number <= most:
+                raise _native.BundleError(f"{name} is {number}; needed: 0 to {most}")
         return (size, ram, tiers, quality)
 
     def _repr_html_(self) -> str:
@@ -227,3 +243,14 @@ class Bundle:
     def __repr__(self) -> str:
         header = self.header
         return f"<pocketsplat.Bundle: {header.n_anchors} anchors, {header.n_bytes} bytes, {len(self.tiers)} tiers>"
+
+
+def _check_threads() -> None:
+    """A fork has none of its parent's threads, and would wait for them without end."""
+    global _drawing_pid
+    if _drawing_pid is None:
+        _drawing_pid = os.getpid()
+    elif _drawing_pid != os.getpid():
+        raise RuntimeError(
+            'this process was forked from one that drew, whose threads it has not; start it anew: multiprocessing.get_context("spawn")'
+        )

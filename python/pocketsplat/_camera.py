@@ -86,10 +86,15 @@ def _view_of(viewmat: ArrayLike) -> NDArray[numpy.float64]:
     view = numpy.asarray(viewmat, dtype=numpy.float64)
     if view.shape not in ((4, 4), (3, 4)):
         raise ValueError(f"viewmat of shape {view.shape}; needed: [4, 4] or [3, 4]")
+    if len(view) == 4 and not numpy.allclose(view[3], (0, 0, 0, 1), atol=1e-5):
+        raise ValueError(f"the last row of viewmat is {view[3].tolist()}; needed: 0, 0, 0, 1; transpose it if its last column is that")
     return view[:3]
 
 
 def _as_tuple(camera: Camera) -> CameraTuple:
+    for name, size in (("width_px", camera.width_px), ("height_px", camera.height_px)):
+        if not 0 < size < 1 << 16:
+            raise _native.BundleError(f"{name} of the camera is {size}; needed: 1 to {(1 << 16) - 1}")
     rotation = [number for row in camera.rotation for number in row]
     return (
         rotation,

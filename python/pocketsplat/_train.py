@@ -19,6 +19,8 @@ from typing import Any
 from ._bundle import Bundle
 
 _POLL_S = 0.2
+# Of what a run said that ended without an error of its own.
+_LAST_LINES = 3
 
 
 class TrainError(RuntimeError):
@@ -32,7 +34,7 @@ class Progress:
     iteration: int
     loss: float
     psnr_db: float
-    """Mean over the training views since the row before, as `loss` is."""
+    """Mean over the training views since the row before, as `loss` is; both are nan where each of those steps was dropped."""
     n_anchors: int
     seconds: float
     """Time spent on iterations so far."""
@@ -120,8 +122,8 @@ class Training:
         return [
             Progress(
                 iteration=int(row["iteration"]),
-                loss=float(row["loss"]),
-                psnr_db=float(row["psnr_db"]),
+                loss=float(row["loss"] or "nan"),
+                psnr_db=float(row["psnr_db"] or "nan"),
                 n_anchors=int(row["anchors"]),
                 seconds=float(row["seconds"]),
             )
@@ -134,13 +136,24 @@ class Training:
             said = self._said.read().strip()
             self._said.close()
             at = said.find("error: ")
-            self._error = said[at:] if at >= 0 else said
+            # Killed, it had no time to say why: the last of its progress tells how far it came.
+            last = "\n".join(said.splitlines()[-_LAST_LINES:])
+            self._error = said[at:] if at >= 0 else f"training {_end_of(self._process.returncode)}\n{last}".strip()
             self._warnings = [line for line in said.splitlines() if line.startswith("warning: ")]
         code = self._process.returncode
         if code != 0:
-            raise TrainError(self._error or f"training ended with exit code {code}")
+            raise TrainError(self._error)
         while self._warnings:
             warnings.warn(self._warnings.pop(0).removeprefix("warning: "), stacklevel=3)
+
+
+def _run_beside(output: Path) -> Path:
+    """OUT.run for a bundle, OUT.ply.run for another file."""
+    return output.with_suffix(".run") if output.suffix.lower() in ("", ".psb") else output.with_name(output.name + ".run")
+
+
+def _end_of(code: int) -> str:
+    return f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
 
 
 def train(capture: str | os.PathLike[str], output: str | os.PathLike[str], **options: Any) -> Training:
@@ -155,12 +168,14 @@ def train(capture: str | os.PathLike[str], output: str | os.PathLike[str], **opt
     `--overwrite`, lists are joined by commas, but that of `set_` is several `--set`. An underscore at the end keeps words of Python
     apart: `lambda_`.
 
-    Raises ValueError for `dry_run`, `help` and `version`, which train nothing.
+    Raises ValueError for `dry_run`, `help` and `version`, which train nothing, and for `watch=True`, whose address nobody would see.
     """
     for name, value in options.items():
         option = name.rstrip("_").replace("_", "-")
         if value and option in ("dry-run", "help", "version"):
             raise ValueError(f"{name} trains nothing; give it to the command: `python -m pocketsplat train CAPTURE --{option}`")
+    if options.get("watch") is True:
+        raise ValueError("watch=True takes a port that nobody is told; give one: watch=8080")
     # By its path: `-m pocketsplat` would look into the working folder first.
     program = Path(__file__).with_name("__main__.py")
     command = [sys.executable, str(program), "train", os.fspath(capture), "-o", os.fspath(output)]
@@ -173,5 +188,5 @@ def train(capture: str | os.PathLike[str], output: str | os.PathLike[str], **opt
             # `=` keeps values that begin with a hyphen apart from options.
             command += [f"{option}={one}" for one in (values if option == "--set" else [",".join(values)])]
     bundle = Path(output).absolute()
-    run = Path(options["run"]).absolute() if options.get("run") else bundle.with_suffix(".run")
+    run = Path(options["run"]).absolute() if options.get("run") else _run_beside(bundle)
     return Training(command, bundle, run)

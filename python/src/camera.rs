@@ -3,7 +3,7 @@
 use pocketsplat_core::{Camera, Rotation};
 use pyo3::prelude::*;
 
-use crate::error::raised;
+use crate::error::{BundleError, raised};
 
 /// Rotation row by row, translation, focal lengths, principal point, width and height.
 pub(crate) type CameraTuple = ([f32; 9], [f32; 3], [f32; 2], [f32; 2], u16, u16);
@@ -26,5 +26,9 @@ pub(crate) fn camera_of(tuple: &CameraTuple) -> PyResult<Camera> {
 /// * `angle`: radians.
 #[pyfunction]
 pub(crate) fn orbited(camera: CameraTuple, angle: f32) -> PyResult<CameraTuple> {
+    let most = Camera::MAX_ANGLE;
+    if !(-most..=most).contains(&angle) {
+        return Err(BundleError::new_err(format!("angle {angle}; needed: radians, at most {most} in size")));
+    }
     Ok(tuple_of(&camera_of(&camera)?.orbited(angle)))
 }

@@ -147,6 +147,33 @@ class Bundles(unittest.TestCase):
         with self.assertRaises(pocketsplat.BundleError):
             bundle.render(sheared)
 
+    def test_numbers_out_of_range_are_said(self) -> None:
+        bundle = Bundle.open(GOLDEN / "static.psb")
+        camera = bundle.preview
+        with self.assertRaisesRegex(ValueError, "last row of viewmat is .* transpose it"):
+            Camera.from_matrices(bundle.preview.viewmat.T, camera.K, 80, 60)
+        for draw in (lambda: bundle.render(camera.resized(70000, 60)), lambda: bundle.gaussians(camera.resized(80, 0))):
+            with self.assertRaisesRegex(pocketsplat.BundleError, "of the camera is"):
+                draw()
+        for angle in (float("nan"), 1e6):
+            with self.assertRaisesRegex(pocketsplat.BundleError, "at most 8192"):
+                camera.orbited(angle)
+        for limits in ({"ram": -1}, {"tiers": 256}, {"size": (-2, 60)}):
+            with self.assertRaisesRegex(pocketsplat.BundleError, "needed: 0 to"):
+                bundle.plan(**limits)  # type: ignore[arg-type]
+
+    def test_a_fork_does_not_wait_for_threads_that_it_has_not(self) -> None:
+        bundle = Bundle.open(GOLDEN / "static.psb")
+        bundle.render([bundle.preview] * 2)
+        child = os.fork()
+        if child == 0:
+            try:
+                bundle.render([bundle.preview] * 2)
+            except RuntimeError:
+                os._exit(0)
+            os._exit(1)
+        self.assertEqual(os.waitpid(child, 0)[1], 0)
+
     def test_a_notebook_gets_a_page_in_a_frame(self) -> None:
         shown = Bundle.open(GOLDEN / "static.psb")._repr_html_()
         self.assertTrue(shown.startswith('<iframe srcdoc="&lt;'), shown[:80])
@@ -202,6 +229,24 @@ class TrainingRuns(unittest.TestCase):
         for name in ("dry_run", "help"):
             with self.assertRaisesRegex(ValueError, "trains nothing"):
                 pocketsplat.train(self.capture, "c.psb", **{name: True})
+
+        with self.assertRaisesRegex(ValueError, "watch=8080"):
+            pocketsplat.train(self.capture, "c.psb", watch=True)
+
+    def test_steps_that_were_all_dropped_have_no_loss(self) -> None:
+        training = pocketsplat.Training.__new__(pocketsplat.Training)
+        training.run, training._started = Path(self.folder.name), 0.0
+        (training.run / "progress.csv").write_text("iteration,loss,psnr_db,anchors,seconds\n1,,,9,0.5\n2,0.1,20,9,1\n")
+        dropped, sound = training._rows()
+        self.assertTrue(numpy.isnan([dropped.loss, dropped.psnr_db]).all())
+        self.assertEqual((sound.iteration, sound.loss, sound.psnr_db), (2, 0.1, 20.0))
+
+    def test_a_run_that_is_killed_says_so(self) -> None:
+        training = pocketsplat.train(self.capture, Path(self.folder.name, "k.psb"), iterations=3000)
+        next(iter(training))
+        training._process.kill()
+        with self.assertRaisesRegex(pocketsplat.TrainError, "was ended by SIGKILL"):
+            training.wait()
 
     def test_warnings_and_several_keys_come_through(self) -> None:
         keys = ["train.shape.n_offsets=2", "train.shape.feature_dim=4"]

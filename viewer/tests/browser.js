@@ -131,6 +131,14 @@ async function hands() {
   await settled();
   check(state.device && view.canvas.width === view.bundle.widthPx, 'the device view has the device’s pixels');
   check(getComputedStyle(view.canvas).imageRendering === 'pixelated', 'and shows each');
+  const widthShown = () => view.canvas.getBoundingClientRect().width;
+  const roomy = widthShown();
+  stage.style.height = '240px';
+  await sleep(300);
+  check(widthShown() < roomy, `a smaller window lays the display out anew: ${widthShown()} px wide, before ${roomy}`);
+  stage.style.height = '';
+  await sleep(300);
+  check(widthShown() === roomy, 'and a larger one');
   const slide = (id, value) => {
     const input = document.getElementById(id);
     input.value = value;

@@ -36,6 +36,8 @@ async function isSame(address, settings) {
 
 for (let i = 0; i < 600 && !isDrawn(); i++) await sleep(100);
 check(isDrawn(), 'a first picture');
+const nRead = performance.getEntriesByType('resource').filter(({ name }) => name.endsWith('/scene.psb')).length;
+check(nRead === 1, `the bundle is read once: ${nRead}`);
 check(view.bundle.nAnchors === 310, 'it says what the bundle is');
 check(await isSame('scene.psb'), 'the pixels are the decoder’s');
 const { widthPx } = view.bundle;
@@ -60,6 +62,11 @@ view.setAttribute('quality', 'fast');
 await sleep(500);
 check(!message().hidden && message().textContent.includes('"fast"'), `what is refused is said: ${message().textContent}`);
 check(getComputedStyle(message()).color === 'rgb(255, 255, 255)', 'and can be read');
+view.orbit.turn(0.1, 0);
+view.draw();
+await sleep(1000);
+check(!message().hidden, 'of the next picture too');
+view.orbit.place = before;
 view.removeAttribute('quality');
 check((await isSame('scene.psb')) && message().hidden, 'and forgotten');
 
@@ -87,7 +94,8 @@ const stopped = view.orbit.place;
 await sleep(500);
 check(view.orbit.place === stopped, 'and stops');
 view.setAttribute('alt', 'A cup');
-check(canvas().getAttribute('aria-label') === 'A cup', 'it has a name');
+const named = [canvas(), canvas().parentElement].map((part) => part.getAttribute('aria-label'));
+check(named.every((name) => name === 'A cup'), `it has a name: ${named}`);
 
 const main = document.querySelector('main');
 view.remove();

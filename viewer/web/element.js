@@ -30,8 +30,8 @@ function decoder() {
   return compiled;
 }
 
-async function bytesAt(address) {
-  const response = await fetch(address);
+async function bytesAt(address, signal) {
+  const response = await fetch(address, { signal });
   if (!response.ok) throw new Error(`${address}: the server answers ${response.status} ${response.statusText}`.trim());
   return response.arrayBuffer();
 }
@@ -43,6 +43,8 @@ export class PocketsplatView extends HTMLElement {
   #shown;
   #message;
   #place;
+  /** Between its callbacks; what is written in a page is connected before, and then its attributes change first. */
+  #isPlaced = false;
   #size = new ResizeObserver(() => this.draw());
 
   constructor() {
@@ -81,31 +83,34 @@ export class PocketsplatView extends HTMLElement {
   }
 
   connectedCallback() {
+    this.#isPlaced = true;
     this.#size.observe(this);
     this.#open();
   }
 
   disconnectedCallback() {
+    this.#isPlaced = false;
     this.#size.disconnect();
     this.#close();
   }
 
   attributeChangedCallback(name, before, after) {
-    if (!this.isConnected || before === after) return;
+    if (!this.#isPlaced || before === after) return;
     const { view, motion } = this.#shown ?? {};
     if (name === 'src') this.#open();
-    else if (name === 'alt') view?.canvas.setAttribute('aria-label', this.#name());
+    else if (name === 'alt') [view?.figure, view?.canvas].forEach((part) => part?.setAttribute('aria-label', this.#name()));
     else if (name === 'spin' && motion) this.#spin();
     else motion?.touch();
   }
 
   #name() {
-    return this.getAttribute('alt') ?? 'A scene; drag it or use the arrow keys';
+    return this.getAttribute('alt') ?? 'A scene';
   }
 
   #close() {
     this.#shown?.motion?.stop();
     this.#shown?.view.close();
+    this.#shown?.reading.abort();
     this.#shown = undefined;
     this.#place.replaceChildren();
   }
@@ -113,15 +118,17 @@ export class PocketsplatView extends HTMLElement {
   async #open() {
     this.#close();
     if (!this.src) return this.#say('');
-    const shown = { view: new View(this.#name(), this.#place), sharpness: new Sharpness() };
+    const shown = { view: new View(this.#name(), this.#place), sharpness: new Sharpness(), reading: new AbortController() };
     this.#shown = shown;
     const { figure } = shown.view;
     figure.tabIndex = 0;
-    figure.setAttribute('role', 'group');
-    figure.setAttribute('aria-label', 'Scene: drag to turn, or use the arrow keys');
+    // Not `group`, with which screen readers keep the arrow keys.
+    figure.setAttribute('role', 'application');
+    figure.setAttribute('aria-label', this.#name());
+    figure.setAttribute('aria-description', 'Drag to turn, or use the arrow keys');
     this.#say('Loading');
     try {
-      const [module, bundle] = await Promise.all([decoder(), bytesAt(new URL(this.src, document.baseURI))]);
+      const [module, bundle] = await Promise.all([decoder(), bytesAt(new URL(this.src, document.baseURI), shown.reading.signal)]);
       // Another one may have been asked for meanwhile.
       if (this.#shown !== shown) return;
       const worker = () => new Worker(new URL('./worker.js', import.meta.url), { type: 'module' });

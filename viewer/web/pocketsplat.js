@@ -5,8 +5,8 @@ import { list, positive, real, refuse, whole } from './check.js';
 const MAX_FRAME_PX = 4080;
 const MAX_ALPHA_CUT = 64;
 const MAX_TIERS = 255;
-/** Beyond this an angle of 32 bits is no angle. */
-const MAX_ANGLE = 1e5;
+/** Beyond this the decoder's sine and cosine are not exact. */
+const MAX_ANGLE = 8192;
 const QUALITIES = {
   exact: { alphaCut: 1, detail: true },
   balanced: { alphaCut: 2, detail: true },

@@ -41,9 +41,11 @@ class Drawer {
   async draw(settings, camera) {
     const wanted = JSON.stringify({ ...settings, ramBytes: String(settings.ramBytes) });
     if (wanted !== this.settings) {
-      this.settings = wanted;
+      // Bound to none until it has answered: a refusal is asked for again.
+      this.settings = '';
       const { limits, plan, refused } = await this.ask('bind', { settings });
       this.answer = { limits, plan, refused };
+      this.settings = wanted;
     }
     return this.answer.refused ? this.answer : { ...this.answer, frame: await this.ask('render', { camera }) };
   }

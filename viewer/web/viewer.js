@@ -108,7 +108,8 @@ function layOut({ canvas, figure }) {
     return;
   }
   const [width, height] = state.size;
-  const room = Math.min((figure.clientWidth - 40) / width, (figure.clientHeight - 90) / height) * devicePixelRatio;
+  const free = [Math.max(figure.clientWidth - 40, 8) / width, Math.max(figure.clientHeight - 90, 8) / height];
+  const room = Math.min(...free) * devicePixelRatio;
   const scale = (room >= 1 ? Math.floor(room) : room) / devicePixelRatio;
   canvas.style.width = `${width * scale}px`;
   canvas.style.height = `${height * scale}px`;
@@ -270,7 +271,10 @@ function listen() {
   for (const input of document.querySelectorAll('input[name="quality"]')) {
     input.addEventListener('change', () => ((state.quality = input.value), motion.touch()));
   }
-  new ResizeObserver(() => motion.touch()).observe(stage);
+  new ResizeObserver(() => {
+    views.forEach(layOut);
+    motion.touch();
+  }).observe(stage);
 }
 
 function save() {
@@ -314,8 +318,8 @@ async function start() {
   for (const view of others) view.orbit?.refocus(await view.focus());
   const placed = place();
   addEventListener('hashchange', place);
-  // A second worker for each where cores are idle.
-  if (navigator.hardwareConcurrency >= 4 * views.length) await open();
+  // A second worker for each where cores are idle; the page draws without it, where there is no memory for another.
+  if (navigator.hardwareConcurrency >= 4 * views.length) await open().catch(() => {});
   know();
   if (!placed && !matchMedia('(prefers-reduced-motion: reduce)').matches) motion.swayAfter(LOOK_MS);
 }

@@ -242,12 +242,6 @@ impl ScratchShape {
         }
     }
 
-    /// Bytes of one anchor in memory.
-    #[must_use]
-    pub const fn resident_anchor_len(&self) -> usize {
-        self.record_layout().n_words().saturating_mul(2)
-    }
-
     /// Floats of the sums of all features in memory.
     pub(super) const fn sums_len(&self) -> usize {
         if self.resident.has_sums() { self.resident.len().saturating_mul(self.heads().anchor_sums_len()) } else { 0 }

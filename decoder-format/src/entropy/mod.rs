@@ -20,4 +20,4 @@ pub use model::{FREQUENCY_TOTAL, PRECISION_BITS, Slot, SymbolModel, UniformByte}
 pub use normal::{
     EIGHTHS, N_NORMAL_SHORT_CUTS, N_PHASES, N_SCALES, NORMAL_WINDOW, NormalModel, SCALE_ONE, SymbolSlots,
 };
-pub use trie::{Children, MAX_TRIE_LEVELS, N_TRIE_CONTEXTS, NodeModel, TrieModel, TrieReader};
+pub use trie::{Children, N_TRIE_CONTEXTS, NodeModel, TrieModel, TrieReader};

@@ -11,9 +11,6 @@ use super::model::{FREQUENCY_TOTAL, Slot, SymbolModel};
 /// Contexts of a node: how many of its last three ancestors have both children, 2 and 3 counted alike.
 pub const N_TRIE_CONTEXTS: usize = 3;
 
-/// Most levels: the codes and the marks of a path fit a u64.
-pub const MAX_TRIE_LEVELS: usize = 63;
-
 /// The frequencies of a trie's symbols, level by level from the root.
 #[derive(Clone, Copy, Debug)]
 pub struct TrieModel<'a> {

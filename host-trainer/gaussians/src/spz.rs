@@ -7,7 +7,6 @@
 //! to a step that the header names, ln of scales to 1/16 between −10 and 5.9, opacities and the constant colour to 8 bits, rotations to
 //! 10 bits a part, harmonics to 1/64 between −1 and 1.
 
-mod half;
 mod header;
 mod records;
 mod rotation;

@@ -16,8 +16,8 @@ pub use baseline::half_size_enlarged;
 pub use bjontegaard::{BjontegaardError, RatePoint, bd_psnr_db, bd_rate_percent};
 pub use colour::colour_corrected;
 pub use lpips::{InputRange, Lpips, LpipsError};
-pub use psnr::{psnr_db, psnr_db_masked, psnr_of_floats_db};
-pub use seeds::{RateDifference, SeededDifference, bd_rate_over_seeds, ln_excess, rate_difference};
+pub use psnr::{psnr_db, psnr_db_masked};
+pub use seeds::{SeededDifference, bd_rate_over_seeds};
 pub use ssim::{ssim, ssim_masked};
 
 use std::borrow::Cow;

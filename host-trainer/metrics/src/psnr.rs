@@ -34,21 +34,6 @@ pub fn psnr_db_masked(a: &Image, b: &Image, mask: Option<&Mask>) -> f64 {
     if mask.n_valid() == 0 { f64::NAN } else { of(squares, 3 * mask.n_valid()) }
 }
 
-/// PSNR of two images of values in [0, 1], clamped to it: `−10·log10(MSE)`, dB.
-///
-/// The figure before rounding to 8 bit; it exceeds [`psnr_db`] a little where the images are close.
-///
-/// * `a`, `b`: any layout, the same for both.
-///
-/// # Panics
-/// When the lengths differ.
-pub fn psnr_of_floats_db(a: &[f32], b: &[f32]) -> f64 {
-    assert_eq!(a.len(), b.len(), "images to compare must have one size");
-    let squares: f64 =
-        a.iter().zip(b).map(|(&x, &y)| (f64::from(x.clamp(0.0, 1.0)) - f64::from(y.clamp(0.0, 1.0))).powi(2)).sum();
-    -10.0 * (squares / a.len() as f64).log10()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -61,8 +46,6 @@ mod tests {
     fn a_constant_error_gives_its_closed_form() {
         let db = psnr_db(&flat(100), &flat(110));
         assert!((db - 20.0 * (255.0_f64 / 10.0).log10()).abs() < 1e-12, "{db}");
-        let floats = psnr_of_floats_db(&[0.5; 9], &[0.25; 9]);
-        assert!((floats - 20.0 * 4.0_f64.log10()).abs() < 1e-12, "{floats}");
     }
 
     #[test]
@@ -84,10 +67,5 @@ mod tests {
         assert!(no_error(Some(&mask)) < no_error(None), "fewer values");
         mask.valid.fill(false);
         assert!(psnr_db_masked(&a, &b, Some(&mask)).is_nan());
-    }
-
-    #[test]
-    fn floats_are_clamped_before_they_are_compared() {
-        assert_eq!(psnr_of_floats_db(&[1.5, -1.0], &[1.0, 0.0]), f64::INFINITY);
     }
 }

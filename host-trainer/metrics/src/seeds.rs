@@ -21,15 +21,6 @@ fn student(freedom: usize) -> f64 {
     STUDENT.get(freedom - 1).copied().unwrap_or_else(series)
 }
 
-/// A mean difference with its 95 % interval, percent of bytes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RateDifference {
-    /// How many more bytes for the same quality; negative is better.
-    pub percent: f64,
-    /// Ends of the interval.
-    pub interval: [f64; 2],
-}
-
 /// A mean difference, and its 95 % interval where there are seeds enough to tell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SeededDifference {
@@ -92,39 +83,6 @@ fn half_interval(a: &[f64], b: &[f64]) -> Option<f64> {
     Some(student(freedom) * (variance * (1.0 / a.len() as f64 + 1.0 / b.len() as f64)).sqrt())
 }
 
-/// ln of the bytes of `point` over those that the curve `reference` takes for its PSNR.
-///
-/// The curve is straight in ln bytes over PSNR between the two points that enclose it, or the two nearest to it beyond the
-/// ends; `None` for a curve of fewer than two points of different PSNR.
-pub fn ln_excess(reference: &[RatePoint], point: &RatePoint) -> Option<f64> {
-    let mut curve = reference.to_vec();
-    curve.sort_by(|a, b| a.psnr_db.total_cmp(&b.psnr_db));
-    curve.dedup_by(|a, b| a.psnr_db == b.psnr_db);
-    let above = curve.partition_point(|p| p.psnr_db < point.psnr_db).clamp(1, curve.len().max(2) - 1);
-    let [low, high] = [curve.get(above - 1)?, curve.get(above)?];
-    let along = (point.psnr_db - low.psnr_db) / (high.psnr_db - low.psnr_db);
-    let ln_bytes = low.size_bytes.ln() + along * (high.size_bytes / low.size_bytes).ln();
-    Some(point.size_bytes.ln() - ln_bytes)
-}
-
-/// How many more bytes the runs `compared` take than the runs `reference`, which differ by their seeds alone.
-///
-/// Each run counts by [`ln_excess`] against `curve`, so that runs of different quality can be compared; the interval is that
-/// of the difference of two means with a common variance (Student's t).
-///
-/// `None` with fewer than two runs on either side, or a curve that gives no excess.
-pub fn rate_difference(curve: &[RatePoint], reference: &[RatePoint], compared: &[RatePoint]) -> Option<RateDifference> {
-    let excesses = |runs: &[RatePoint]| runs.iter().map(|p| ln_excess(curve, p)).collect::<Option<Vec<f64>>>();
-    let (a, b) = (excesses(reference)?, excesses(compared)?);
-    let half = half_interval(&a, &b)?;
-    let difference = mean(&b) - mean(&a);
-    let percent = |ln: f64| 100.0 * ln.exp_m1();
-    Some(RateDifference {
-        percent: percent(difference),
-        interval: [percent(difference - half), percent(difference + half)],
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -134,40 +92,10 @@ mod tests {
     }
 
     #[test]
-    fn points_of_the_curve_have_no_excess_and_half_the_bytes_are_minus_ln_2() {
-        let curve = points(&[(4e5, 32.0), (2e5, 30.0), (8e5, 33.0)]);
-        for point in &curve {
-            assert!(ln_excess(&curve, point).unwrap().abs() < 1e-12);
-        }
-        let half = RatePoint { size_bytes: 1e5, psnr_db: 30.0 };
-        assert!((ln_excess(&curve, &half).unwrap() + 2f64.ln()).abs() < 1e-12);
-        let beyond = RatePoint { size_bytes: 16e5, psnr_db: 34.0 };
-        assert!(ln_excess(&curve, &beyond).unwrap().abs() < 1e-12, "the last piece goes on");
-        let below = RatePoint { size_bytes: 1e5, psnr_db: 28.0 };
-        assert!(ln_excess(&curve, &below).unwrap().abs() < 1e-12, "and the first");
-        assert_eq!(ln_excess(&curve[..1], &half), None);
-    }
-
-    #[test]
     fn quantiles_beyond_the_table_are_those_of_student() {
         for (freedom, known) in [(10, 2.228), (11, 2.201), (12, 2.179), (20, 2.086), (60, 2.000), (100_000, 1.960)] {
             assert!((student(freedom) - known).abs() < 6e-4, "{freedom}: {}", student(freedom));
         }
-    }
-
-    #[test]
-    fn an_interval_is_as_wide_as_the_seeds_differ() {
-        let curve = points(&[(2e5, 30.0), (4e5, 32.0)]);
-        let runs = |factor: f64, spread: f64| {
-            points(&[-1.0, 0.0, 1.0].map(|s: f64| (factor * 2e5 * (spread * s).exp(), 30.0)))
-        };
-        let sure = rate_difference(&curve, &runs(1.0, 0.0), &runs(0.9, 0.0)).unwrap();
-        assert!((sure.percent + 10.0).abs() < 1e-9 && (sure.interval[0] - sure.interval[1]).abs() < 1e-9, "{sure:?}");
-        let unsure = rate_difference(&curve, &runs(1.0, 0.05), &runs(0.9, 0.05)).unwrap();
-        // s² = 0.05², standard error 0.05·√(2/3), four degrees of freedom.
-        let half = 2.776 * 0.05 * (2.0f64 / 3.0).sqrt();
-        assert!((unsure.interval[1] - 100.0 * (0.9f64.ln() + half).exp_m1()).abs() < 1e-9, "{unsure:?}");
-        assert_eq!(rate_difference(&curve, &curve[..1], &curve), None);
     }
 
     #[test]

@@ -14,7 +14,7 @@ pub mod train;
 
 /// Revision of training: raised by the commit that changes what a run gives, from its photographs to its bundle, so that figures of two
 /// programs are told apart.
-pub const REVISION: u32 = 6;
+pub const REVISION: u32 = 7;
 
 /// Version and revision of training of a program that tables name: `0.1.0 r1` of `0.1.0 r1 1a2b3c4, measured by …`.
 pub fn revision_of(program: &str) -> &str {

@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_format::math::{exp, sigmoid, tanh};
+use pocketsplat_kernels::finite_difference::random;
 use pocketsplat_kernels::ops::heads::head_input;
 use pocketsplat_kernels::ops::loss::normality::{ChannelMoments, Weights};
 use pocketsplat_kernels::ops::loss::ssim;
@@ -12,7 +13,7 @@ use pocketsplat_kernels::ops::{Pinhole, adam};
 use pocketsplat_kernels::scene::ModelShape;
 
 use super::blobs::{Blob, Blobs};
-use super::gradient::{difference_error, random};
+use super::gradient::difference_error;
 use super::picture::{Picture, camera};
 use super::{Case, Family, error, n_not_finite, picture};
 use crate::difference::worse;

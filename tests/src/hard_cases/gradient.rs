@@ -1,14 +1,13 @@
 //! The trainer's gradients of a whole step: finite, right in f64, and about the same in f32.
 
 use pocketsplat_capture::camera::Camera;
+use pocketsplat_kernels::finite_difference::random;
 use pocketsplat_kernels::ops::Pinhole;
 use pocketsplat_kernels::real::Real;
 use pocketsplat_kernels::scene::Scene;
 use pocketsplat_kernels::step::LossWeights;
 use pocketsplat_kernels::step::coding::Coding;
 use pocketsplat_kernels::step::{Loss, TargetView, Workspace};
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 use crate::difference::worse;
 
@@ -22,12 +21,6 @@ const LEAST_SLOPE: f64 = 1e-4;
 const LEAST_RESIDUAL: f64 = 1e-3;
 /// Gradients below are judged as if they were this large.
 const LEAST_GRADIENT: f64 = 1e-6;
-
-/// `len` values in [−1, 1), the same for the same seed.
-pub fn random(seed: u64, len: usize) -> Vec<f64> {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    (0..len).map(|_| rng.random_range(-1.0..1.0)).collect()
-}
 
 /// How far a slope is from a fourth-order central difference of `f` around 0, of `scale`: the first as near as
 /// 10⁻⁷, or the best.

@@ -166,10 +166,14 @@ fn a_resident_anchor_takes_what_its_symbols_take_and_little_more() {
     shape.record.lattice_bits = 10;
     shape.coder.context_hidden = 32;
     // 34 symbols of 16 bits, cell, mask, steps.
-    assert_eq!(shape.resident_anchor_len(), 2 * (34 * 16 + 30 + 4 + 16_usize).div_ceil(16), "of any symbols");
+    assert_eq!(2 * shape.record_layout().n_words(), 2 * (34 * 16 + 30 + 4 + 16_usize).div_ceil(16), "of any symbols");
     shape.coder.context_hidden = 0;
     shape.record = RecordShape { masks: false, symbol_bits: [6, 8, 7], ..shape.record };
-    assert_eq!(shape.resident_anchor_len(), 2 * (16 * 6 + 6 * 8 + 12 * 7 + 30_usize).div_ceil(16), "of small ones");
+    assert_eq!(
+        2 * shape.record_layout().n_words(),
+        2 * (16 * 6 + 6 * 8 + 12 * 7 + 30_usize).div_ceil(16),
+        "of small ones"
+    );
 }
 
 #[test]

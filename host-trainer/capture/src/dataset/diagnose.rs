@@ -37,10 +37,8 @@ pub struct Diagnosis {
     pub n_test: usize,
     /// Points the capture brings.
     pub n_points: usize,
-    /// Views with masks, and how many pixels these leave out; none unless decoded.
+    /// Views with masks, and how many pixels these leave out.
     pub masked: Vec<MaskedView>,
-    /// Whether the pixels of all images were decoded, too.
-    pub decoded: bool,
     /// What a person should know, the worst first.
     pub findings: Vec<Finding>,
 }
@@ -51,15 +49,6 @@ pub struct Diagnosis {
 /// fails: what makes the capture unusable is a finding of severity [`Severity::Error`]. Takes as long as loading; one
 /// image per thread is held.
 pub fn diagnose(path: &Path, options: &LoadOptions) -> Diagnosis {
-    check(path, options, true)
-}
-
-/// [`diagnose`] without decoding images: headers, poses, lenses and points; takes milliseconds per hundred views.
-pub fn diagnose_cheaply(path: &Path, options: &LoadOptions) -> Diagnosis {
-    check(path, options, false)
-}
-
-fn check(path: &Path, options: &LoadOptions, decode: bool) -> Diagnosis {
     let mut diagnosis = Diagnosis {
         path: path.to_owned(),
         layout: layout_of(path),
@@ -67,7 +56,6 @@ fn check(path: &Path, options: &LoadOptions, decode: bool) -> Diagnosis {
         n_test: 0,
         n_points: 0,
         masked: Vec::new(),
-        decoded: decode,
         findings: Vec::new(),
     };
     let mut listing = match super::list(path, options) {
@@ -78,9 +66,7 @@ fn check(path: &Path, options: &LoadOptions, decode: bool) -> Diagnosis {
         }
     };
     let mut findings = Vec::new();
-    if decode {
-        diagnosis.masked = pixels::check(&mut listing, options, &mut findings);
-    }
+    diagnosis.masked = pixels::check(&mut listing, options, &mut findings);
     views::not_used(&listing, &mut findings);
     findings.extend(doubts(&listing, options));
     findings.extend(listing.notes.iter().map(|note| Finding::told(note.severity, note.code, &note.text)));
@@ -157,10 +143,6 @@ impl fmt::Display for Diagnosis {
             writeln!(f, "{finding}")?;
         }
         let [errors, warnings, notes] = [Severity::Error, Severity::Warning, Severity::Note].map(|s| self.count(s));
-        write!(f, "errors: {errors}, warnings: {warnings}, notes: {notes}")?;
-        if !self.decoded {
-            write!(f, " (pixels not decoded)")?;
-        }
-        Ok(())
+        write!(f, "errors: {errors}, warnings: {warnings}, notes: {notes}")
     }
 }

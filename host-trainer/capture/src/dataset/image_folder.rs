@@ -7,7 +7,9 @@ use super::listing::{Note, is_hidden};
 use super::{DatasetError, LoadOptions};
 
 /// The folder of full-size images.
-const DEFAULT: &str = "images";
+pub(super) const FULL_SIZE: &str = "images";
+/// How the names of folders of smaller ones begin.
+pub(super) const REDUCED: &str = "images_";
 /// Where some tools look for photographs before a reconstruction.
 const UNPREPARED: &str = "input";
 
@@ -33,14 +35,14 @@ pub(super) fn choose(
         [] if holds_images(folder) => Ok(Some(String::new())),
         [] => Ok(None),
         [only] => Ok(Some(only.clone())),
-        several if several.iter().any(|name| name == DEFAULT) => {
-            let others: Vec<&str> = several.iter().filter(|name| *name != DEFAULT).map(String::as_str).collect();
+        several if several.iter().any(|name| name == FULL_SIZE) => {
+            let others: Vec<&str> = several.iter().filter(|name| *name != FULL_SIZE).map(String::as_str).collect();
             let text = format!(
-                "images are read from `{DEFAULT}` although `{}` is there, too; choose another folder with `--images`",
+                "images are read from `{FULL_SIZE}` although `{}` is there, too; choose another folder with `--images`",
                 others.join("`, `")
             );
             notes.push(Note::new("several-image-folders", text));
-            Ok(Some(DEFAULT.to_owned()))
+            Ok(Some(FULL_SIZE.to_owned()))
         }
         _ => Err(DatasetError::ImageFolder { path: folder.to_owned(), wanted: None, present }),
     }
@@ -65,7 +67,7 @@ fn present(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let names =
         entries.filter(|entry| entry.path().is_dir()).map(|entry| entry.file_name().to_string_lossy().into_owned());
-    let mut names: Vec<String> = names.filter(|name| name == DEFAULT || name.starts_with("images_")).collect();
+    let mut names: Vec<String> = names.filter(|name| name == FULL_SIZE || name.starts_with(REDUCED)).collect();
     names.sort_unstable();
     names
 }

@@ -78,7 +78,7 @@ mod view_fault;
 
 pub use cache::{FileFault, remove_cache};
 pub use detect::layout_of;
-pub use diagnose::{Diagnosis, Finding, MAX_FOCAL_RATIO, MaskedView, diagnose, diagnose_cheaply};
+pub use diagnose::{Diagnosis, Finding, MAX_FOCAL_RATIO, MaskedView, diagnose};
 pub use error::DatasetError;
 pub use frame_size::{FrameSize, NoFrameSize};
 pub use layout::Layout;

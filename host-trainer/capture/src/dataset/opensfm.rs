@@ -40,6 +40,8 @@ struct Camera {
     k1: Option<f64>,
     k2: Option<f64>,
     k3: Option<f64>,
+    /// Of `fisheye_opencv`.
+    k4: Option<f64>,
     p1: Option<f64>,
     p2: Option<f64>,
 }
@@ -127,7 +129,7 @@ impl Camera {
         let (w, h) = (self.width, self.height);
         let px = |share: f64| share * w.max(h);
         let camera_model = match self.projection_type.as_str() {
-            "" | "perspective" | "brown" => None,
+            "" | "perspective" | "brown" | "radial" | "simple_radial" => None,
             "fisheye" | "fisheye_opencv" => Some("OPENCV_FISHEYE".to_owned()),
             other => Some(format!("{other} of OpenSfM")),
         };
@@ -141,6 +143,7 @@ impl Camera {
             k1: self.k1,
             k2: self.k2,
             k3: self.k3,
+            k4: self.k4,
             p1: self.p1,
             p2: self.p2,
             camera_model,

@@ -136,10 +136,7 @@ mod tests {
             .map(|i| SkippedView {
                 split: Split::Train,
                 name: format!("train/r_{i}"),
-                fault: ViewFault::Missing {
-                    path: format!("/capture/train/r_{i}").into(),
-                    listed_in: "the transforms file",
-                },
+                fault: ViewFault::Missing { path: format!("/capture/train/r_{i}").into(), listed_in: "the capture" },
             })
             .collect();
         let report = LoadReport {

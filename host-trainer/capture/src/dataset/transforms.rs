@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::folder_names::FolderNames;
 use super::image::{ImageHeader, read_header};
+use super::image_folder::{FULL_SIZE, REDUCED};
 use super::listing::{ListedView, Listing, Note, Shot, unused_images};
 use super::mask_file::MaskFile;
 use super::named_path::NamedPath;
@@ -56,7 +57,7 @@ pub fn cameras_of_transforms(path: &Path, side_px: u32) -> Result<Vec<FrameCamer
             exif_orientation: 1,
             has_other_primaries: false,
         };
-        let lens = camera::lens(&frame.own, &shared, path, &header)?;
+        let lens = camera::lens(&frame.own, &shared, path, &header, header.size_px)?;
         let (focal_px, principal_px) = (lens.focal_px, lens.principal_px);
         Ok(Camera { rotation, translation, focal_px, principal_px, width_px, height_px })
     };
@@ -130,6 +131,20 @@ impl Frame {
         ListedView { split, written: self.path().written().to_owned(), name: self.name().to_owned(), shot }
     }
 
+    /// Width and height of the photograph that the frame's numbers are for unless they say it: of a reduced one, as `images_2` has them,
+    /// that of the full size where it is there.
+    fn numbers_px(&self, names: &FolderNames, folder: &Path, images: Option<&str>, header: &ImageHeader) -> (u32, u32) {
+        let is_reduced = |name: &str| name.starts_with(REDUCED);
+        let full = match images {
+            Some(images) => is_reduced(images).then(|| self.image(names, folder, None)),
+            None => folder
+                .file_name()
+                .is_some_and(|name| is_reduced(&name.to_string_lossy()))
+                .then(|| self.image(names, &folder.with_file_name(FULL_SIZE), None)),
+        };
+        full.flatten().and_then(|path| read_header(&path).ok()).map_or(header.size_px, |full| full.size_px)
+    }
+
     /// The frame's photograph, or why it cannot be used.
     fn shot(
         &self,
@@ -144,12 +159,12 @@ impl Frame {
         }
         let path = self
             .image(names, folder, images)
-            .ok_or_else(|| ViewFault::of_missing(self.path().expected(folder, images), "the transforms file"))?;
+            .ok_or_else(|| ViewFault::of_missing(self.path().expected(folder, images), "the capture"))?;
         let header = match read_header(&path) {
             Ok(header) => header,
             Err(message) => return Err(ViewFault::of_header(path, message)),
         };
-        let lens = camera::lens(&self.own, shared, &path, &header)?;
+        let lens = camera::lens(&self.own, shared, &path, &header, self.numbers_px(names, folder, images, &header))?;
         let mut masks: Vec<MaskFile> = MaskFile::dynamic(names, &path).into_iter().collect();
         if let Some(named) = self.mask_path.as_deref().map(NamedPath::new) {
             let missing = || ViewFault::of_missing_mask(named.expected(folder, None));

@@ -8,7 +8,7 @@ use crate::fixture::photograph;
 
 /// The capture of a case, or `None` after saying what is skipped.
 fn find(name: &str) -> Option<PathBuf> {
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/cases");
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/cases");
     let root = std::env::var_os("POCKETSPLAT_DATA").map_or(beside, |data| PathBuf::from(data).join("../cases"));
     let capture = root.join(name);
     if !capture.is_dir() {

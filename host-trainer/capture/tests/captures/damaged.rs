@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use pocketsplat_capture::dataset::{LoadOptions, diagnose_cheaply};
+use pocketsplat_capture::dataset::{LoadOptions, diagnose};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
@@ -87,7 +87,7 @@ fn no_damage_to_the_files_of_poses_makes_loading_panic() {
             damage(&mut bytes, &mut rng);
             std::fs::write(path, bytes).expect("a file");
             n_refused += usize::from(fixture.load_with(&options).is_err());
-            diagnose_cheaply(fixture.path(), &options);
+            diagnose(fixture.path(), &options);
             std::fs::write(path, sound).expect("a file");
         }
         assert!(fixture.load_with(&options).is_ok(), "{kind:?}: sound again");

@@ -306,3 +306,42 @@ fn cameras_of_metashape_that_are_none_are_named() {
         assert!(error.contains(part), "{error}");
     }
 }
+
+#[test]
+fn a_focal_length_without_a_size_is_for_photographs_of_full_size() {
+    let write: [fn(&Fixture); 2] = [write_bundler, |f| {
+        f.write_files();
+        let text = std::fs::read_to_string(f.at("transforms.json")).expect("written");
+        let kept = text.lines().map(|line| {
+            let is_size =
+                |part: &&str| part.trim_start().starts_with("\"w\"") || part.trim_start().starts_with("\"h\"");
+            line.split(',').filter(|part| !is_size(part)).collect::<Vec<_>>().join(",")
+        });
+        f.write("transforms.json", kept.collect::<Vec<_>>().join("\n"));
+    }];
+    for write in write {
+        let fixture = Fixture::new(Kind::Nerfstudio, 9);
+        write(&fixture);
+        let focal = |options: &LoadOptions| fixture.load_with(options).expect("sound").0.train[0].camera.focal_px[0];
+        let full = focal(&LoadOptions::default());
+        let (width_px, height_px) = SIZE_PX;
+        for photo in &fixture.photos {
+            fixture.write_image(&format!("images_2/{}", photo.name), (width_px / 2, height_px / 2));
+        }
+        let half = focal(&LoadOptions { images: Some("images_2".to_owned()), ..LoadOptions::default() });
+        assert!((half - 0.5 * full).abs() < 1e-9, "{half} of {full}");
+    }
+}
+
+#[test]
+fn the_fisheye_lens_of_opensfm_has_four_coefficients() {
+    let shift = |k4: f64| {
+        let fixture = Fixture::new(Kind::Nerfstudio, 9);
+        write_opensfm(&fixture);
+        let text = std::fs::read_to_string(fixture.at("reconstruction.json")).expect("written");
+        let lens = format!("\"projection_type\": \"fisheye_opencv\", \"k4\": {k4:?}");
+        fixture.write("reconstruction.json", text.replace("\"projection_type\": \"perspective\"", &lens));
+        photograph(&fixture.load().expect("sound").0.train[0]).image.rgb.clone()
+    };
+    assert_ne!(shift(0.0), shift(9.0));
+}

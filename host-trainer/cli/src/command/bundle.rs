@@ -16,10 +16,10 @@ use super::capture::{CaptureArgs, refuse_gaussians};
 use crate::config::{CaptureOptions, Protocol, RunConfig};
 use crate::say::say;
 
-/// What a run's result.json says of its bundle; nothing in those of earlier programs.
+/// What a run's result.json says of its bundle.
 #[derive(Deserialize)]
 struct Written {
-    bundle_crc: Option<u32>,
+    bundle_crc: u32,
 }
 
 /// The bytes of a bundle and where they came from.
@@ -63,15 +63,16 @@ impl BundleFile {
         }
         let file = Self::read(path)?;
         let found = crc32(&file.bytes);
-        match written.bundle_crc {
-            Some(needed) if needed != found => bail!(
+        let needed = written.bundle_crc;
+        if found != needed {
+            bail!(
                 "{} has the checksum {found:08x}, and the run in {} wrote {needed:08x}: another run has replaced it; train that one \
                  anew, with another --output",
                 path.display(),
                 folder.display()
-            ),
-            _ => Ok(file),
+            );
         }
+        Ok(file)
     }
 
     /// Checks the file, each of its chunks too; says so when it is cut at the end of a tier.
@@ -125,19 +126,19 @@ impl BundleFile {
         args: &CaptureArgs,
     ) -> Result<CaptureArgs> {
         let header = bundle.header();
-        let known = Background::of_rgb8(header.background);
-        if let (Some(asked), Some(trained)) = (args.options.background, known)
+        let [width, height] = header.training_px;
+        let header_says = CaptureOptions {
+            max_resolution: Some(u32::from(width.max(height))),
+            background: Background::of_rgb8(header.background),
+            ..CaptureOptions::default()
+        };
+        // What is composited on a background says nothing of what lies behind a scene: a backdrop of the photographs, or a colour that was learned.
+        let trained_with = protocol.map_or(header_says, |protocol| protocol.options.clone());
+        if let (Some(asked), Some(trained)) = (args.options.background, trained_with.background)
             && asked != trained
         {
             bail!("{} was trained on {trained}, not on {asked}; leave --background out", self.path.display());
         }
-        let [width, height] = header.training_px;
-        let header_says = CaptureOptions {
-            max_resolution: Some(u32::from(width.max(height))),
-            background: known,
-            ..CaptureOptions::default()
-        };
-        let trained_with = protocol.map_or(header_says, |protocol| protocol.options.clone());
         Ok(CaptureArgs { dataset: args.dataset.clone(), options: args.options.or(&trained_with) })
     }
 

@@ -22,11 +22,20 @@ pub(crate) fn refuse_gaussians(path: &Path) -> Result<()> {
     Ok(())
 }
 
+/// What lies behind a scene, by its name where it has one.
+pub(crate) fn background_name(rgb8: [u8; 3]) -> String {
+    Background::of_rgb8(rgb8).map_or_else(|| format!("{rgb8:?}"), |known| known.to_string())
+}
+
+/// The same of a capture, whose border may say it.
+pub(crate) fn background_of(capture: &Capture) -> String {
+    background_name(capture.background.map(|channel| (255.0 * channel).round() as u8))
+}
+
 /// Where photographs come from and how they are prepared.
 #[derive(clap::Args, Clone, Debug)]
 pub(crate) struct CaptureArgs {
-    /// Folder of the capture: transforms_train.json (Blender, Synthetic-NeRF), sparse/0 (COLMAP), transforms.json
-    /// (nerfstudio, instant-ngp), or an export of Polycam, Record3D or NSVF.
+    /// Folder of the capture.
     pub(crate) dataset: PathBuf,
     #[command(flatten)]
     pub(crate) options: CaptureOptions,

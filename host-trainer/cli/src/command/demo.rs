@@ -9,6 +9,7 @@ use pocketsplat_capture::synth::{SynthOptions, write_capture};
 use pocketsplat_codec::render::decoder::core_image;
 use pocketsplat_codec::render::reference::ReferenceScene;
 use pocketsplat_files::Outputs;
+use pocketsplat_trainer::train::run::RunFolder;
 
 use super::bundle::BundleFile;
 use super::capture::CaptureArgs;
@@ -76,7 +77,7 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     let capture = capture_args.load_to_train(config.train.seed, None, &[])?;
     decide(&mut config, &capture)?;
     let stop = stop::flag()?;
-    let (folder, start) = begun_or_new(&bundle_path.with_extension("run"), &config, args.overwrite.is_given())?;
+    let (folder, start) = begun_or_new(&RunFolder::beside(bundle_path), &config, args.overwrite.is_given())?;
     let attempt = Attempt { device: args.device.trains_on.open()?, stop: &stop, goes_on: GoesOn::SameCommand };
     let Some(trained) = train_in(folder, &config, &capture, start, attempt, &bundle_output)? else {
         return Ok(ExitCode::from(stop::INTERRUPTED));

@@ -21,7 +21,7 @@ use rayon::prelude::*;
 
 use self::drawn::{drawn_views, mean, view_evaluations};
 use super::bundle::BundleFile;
-use super::capture::{CaptureArgs, views_of};
+use super::capture::{CaptureArgs, background_name, views_of};
 use super::gaussians::{AxesArgs, GaussiansFile};
 use super::lpips::LpipsArgs;
 use super::output;
@@ -216,7 +216,7 @@ pub(crate) fn measure(
         renderer: renderer.name(),
         width_px: views[0].camera.width_px,
         height_px: views[0].camera.height_px,
-        background: options.background.map_or_else(String::new, |b| b.to_string()),
+        background: background_name(bundle.header().background),
         decode_s,
         render_s_per_view: rows[0].seconds,
         scratch_bytes: rows.iter().map(|row| row.scratch_bytes).max().unwrap_or(0),

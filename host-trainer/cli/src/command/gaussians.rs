@@ -19,7 +19,7 @@ use crate::say::say;
 /// Begins each comment that is a line of the protocol.
 const PROTOCOL: &str = "pocketsplat ";
 /// Begins the comment that says which axis points up, as other programs write it too.
-const VERTICAL_AXIS: &str = "Vertical axis:";
+pub(crate) const VERTICAL_AXIS: &str = "Vertical axis:";
 
 /// What a .spz does not say, or says wrongly.
 #[derive(clap::Args, Clone, Copy, Debug)]

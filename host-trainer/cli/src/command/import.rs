@@ -138,7 +138,7 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     let outputs = args.overwrite.outputs().reading(&args.points);
     let mut outputs = args.cameras.iter().fold(outputs, |outputs, path| outputs.reading(path));
     let output = outputs.file(&args.output, BUNDLE)?;
-    let folder = run_folder(args.run.as_deref(), &args.output)?;
+    let folder = run_folder(args.run.as_deref(), &args.output, args.overwrite.is_given())?;
     // Whose folder it is, before pictures are drawn for minutes; which run is in it says the configuration.
     RunFolder::check(&folder, true)?;
     let file = GaussiansFile::read(&args.points, args.axes)?;

@@ -13,6 +13,7 @@ use super::devices::DeviceChoice;
 use super::loaded::LoadedCapture;
 use super::lpips::LpipsArgs;
 use super::outputs::{BUNDLE, OverwriteArgs};
+use super::tables::published::PublishedRow;
 use super::workflow::{Place, Planner};
 use super::{output, point, stop, tables, train, train_args};
 use crate::config::RunConfig;
@@ -47,6 +48,9 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     let spec = Spec::read(&args.spec)?;
     let folder = std::path::absolute(&args.output).with_context(|| format!("{} is no path", args.output.display()))?;
     let lpips = args.lpips.options()?;
+    if let Some(published) = &spec.published {
+        PublishedRow::read_all(published)?;
+    }
     let outputs = args.overwrite.outputs().reading(&args.spec);
     // All of them before the first capture is loaded.
     let mut asked = Vec::new();

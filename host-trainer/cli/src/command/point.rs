@@ -8,6 +8,7 @@ use pocketsplat_files::Outputs;
 use pocketsplat_format::bundle::crc32;
 use pocketsplat_metrics::Lpips;
 use pocketsplat_trainer::train::modules::pruning::Form;
+use pocketsplat_trainer::train::run::RunFolder;
 
 use super::bundle::BundleFile;
 use super::capture::CaptureArgs;
@@ -23,7 +24,7 @@ use crate::say::say;
 /// Brings a point to its end, from wherever it stands; false when it was interrupted before. A device is opened where something is left
 /// to do.
 pub(super) fn trained(config: &RunConfig, capture: &Capture, device: DeviceChoice, stop: &AtomicBool) -> Result<bool> {
-    let (folder, start, device) = match RunStatus::of(&config.output.with_extension("run"), config)? {
+    let (folder, start, device) = match RunStatus::of(&RunFolder::beside(&config.output), config)? {
         RunStatus::New(folder) => {
             let device = device.open()?;
             let before = Estimate::try_out(capture, &config.train, false, device.clone(), stop)?;
@@ -31,7 +32,7 @@ pub(super) fn trained(config: &RunConfig, capture: &Capture, device: DeviceChoic
         }
         RunStatus::Begun(folder) => (folder, Start::Resumed, device.open()?),
         RunStatus::Finished => {
-            let folder = config.output.with_extension("run");
+            let folder = RunFolder::beside(&config.output);
             let file = BundleFile::of_run(&folder, config)?;
             if let Some(why) = file.protocol(&file.parse()?).and_then(|protocol| protocol.contradiction(capture)) {
                 bail!(

@@ -10,7 +10,7 @@ use pocketsplat_kernels::step::SharedDevice;
 use pocketsplat_trainer::device::Limits;
 use pocketsplat_trainer::effects::Price;
 use pocketsplat_trainer::train::config::Backbone;
-use pocketsplat_trainer::train::run::is_file_of_run;
+use pocketsplat_trainer::train::run::{RunFolder, is_file_of_run};
 
 use super::capture::CaptureArgs;
 use super::device_args::DeviceArgs;
@@ -38,7 +38,7 @@ pub(crate) struct Args {
     /// Bundle to write; with --backbone 3dgs a .ply
     #[arg(short, long, value_name = "OUT.psb", required_unless_present_any = ["config", "resume"], help_heading = OUTPUT)]
     output: Option<PathBuf>,
-    /// Folder for configuration, progress and checkpoints [default: OUT.run]
+    /// Folder for configuration, progress and checkpoints [default: OUT.run, or OUT.ply.run]
     #[arg(long, value_name = "DIR", conflicts_with = "resume", help_heading = OUTPUT, hide_short_help = true)]
     run: Option<PathBuf>,
     /// Print the result as JSON [default: as text]
@@ -48,7 +48,7 @@ pub(crate) struct Args {
     #[arg(long, help_heading = OUTPUT, hide_short_help = true)]
     no_report: bool,
     /// Serve a page about the run while it goes on, to this machine alone, at a free port or the one given.
-    #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "0", help_heading = OUTPUT, hide_short_help = true)]
+    #[arg(long, value_name = "PORT", num_args = 0..=1, require_equals = true, default_missing_value = "0", help_heading = OUTPUT, hide_short_help = true)]
     watch: Option<u16>,
     /// Length of the run and size of the images: quick (2,000 iterations, 200 px), standard (7,000, 400 px), or full (30,000,
     /// images as they are) [default: standard]
@@ -70,7 +70,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE.toml", conflicts_with = "resume", help_heading = RUN, hide_short_help = true)]
     config: Option<PathBuf>,
     /// Print the configuration that the run would have, with every key, and the estimate; train nothing and write nothing.
-    #[arg(long, conflicts_with_all = ["resume", "from", "continues"], help_heading = RUN, hide_short_help = true)]
+    #[arg(long, conflicts_with_all = ["resume", "from", "continues", "json"], help_heading = RUN, hide_short_help = true)]
     dry_run: bool,
     /// Run folder of an interrupted run to go on with; give DATASET as well if the capture has moved.
     #[arg(long, value_name = "OUT.run", help_heading = RUN)]
@@ -337,15 +337,30 @@ impl Args {
     ///
     /// * `output`: what it writes in the end.
     pub(crate) fn run_folder(&self, output: &Path) -> Result<PathBuf> {
-        run_folder(self.run.as_deref(), output)
+        run_folder(self.run.as_deref(), output, self.overwrite())
     }
 }
 
 /// Where a run works that writes `output` in the end: the folder `given`, else beside it.
-pub(super) fn run_folder(given: Option<&Path>, output: &Path) -> Result<PathBuf> {
-    let folder = given.map_or_else(|| output.with_extension("run"), Path::to_owned);
+///
+/// * `overwrite`: whether it may be the folder of a run that wrote another file.
+pub(super) fn run_folder(given: Option<&Path>, output: &Path, overwrite: bool) -> Result<PathBuf> {
+    let folder = given.map_or_else(|| RunFolder::beside(output), Path::to_owned);
     if std::path::absolute(&folder).ok() == std::path::absolute(output).ok() {
         bail!("{} cannot be both output and run folder; choose another folder with --run", folder.display());
     }
+    if let Some(other) = output_of(&folder).filter(|other| !overwrite && other.file_name() != output.file_name()) {
+        bail!(
+            "{} is the folder of the run that wrote {}; choose another folder with --run, or replace that run with --overwrite",
+            folder.display(),
+            other.display()
+        );
+    }
     Ok(folder)
+}
+
+/// What the run in a folder writes, of anchors or not.
+fn output_of(folder: &Path) -> Option<PathBuf> {
+    let text = std::fs::read_to_string(folder.join("config.toml")).ok()?;
+    Some(text.parse::<toml::Table>().ok()?.get("output")?.as_str()?.into())
 }

@@ -94,7 +94,7 @@ impl Port {
     /// * `number`: 0 takes a free one.
     pub(super) fn open(number: u16) -> Result<Self> {
         let server = Server::http(("127.0.0.1", number)).map_err(|error| {
-            anyhow!("could not serve the page on port {number}: {error}; choose another, as --watch 8000")
+            anyhow!("could not serve the page on port {number}: {error}; choose another, as --watch=8000")
         })?;
         let Some(number) = server.server_addr().to_ip().map(|address| address.port()) else {
             return Err(anyhow!("the page has no address; leave --watch out"));

@@ -13,7 +13,6 @@ pub(crate) mod target;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use pocketsplat_capture::dataset::Background;
 use pocketsplat_trainer::encode::Encoding;
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
@@ -81,14 +80,17 @@ pub(crate) fn parse<T: DeserializeOwned>(text: &str) -> Result<T> {
     Ok(text.parse::<Table>()?.try_into()?)
 }
 
-/// Keys that every written configuration has.
-const ALWAYS_WRITTEN: [&str; 7] = ["dataset", "output", "keep_checkpoints", "capture", "train", "encoding", "effects"];
-
 impl RunConfig {
     /// Reads a configuration; keys that are missing are those of its preset, as in a run without it.
     pub(crate) fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path);
         let text = text.with_context(|| format!("could not read the configuration {}", path.display()))?;
+        if ExplicitRunConfig::is_one(&text) {
+            bail!(
+                "{} is of a run of --backbone 3dgs; measure its .ply with `eval`, or make a bundle of it with `import`",
+                path.display()
+            );
+        }
         Self::parse(&text).with_context(|| format!("the configuration {} cannot be used", path.display()))
     }
 
@@ -123,12 +125,6 @@ impl RunConfig {
         let backbone: Option<Backbone> = key("train", "backbone").map(|name| name.clone().try_into()).transpose()?;
         let preset: Preset = match given.get("preset") {
             Some(name) => name.clone().try_into()?,
-            // Of a run that began before presets were a key: whatever it does not say it does not have.
-            None if ALWAYS_WRITTEN.iter().all(|key| given.contains_key(*key)) => {
-                let capture = CaptureOptions { background: Some(Background::Black), ..CaptureOptions::default() };
-                let train = TrainConfig { backbone: backbone.unwrap_or_default(), ..TrainConfig::default() };
-                return Ok(Self { capture, train, scales_lambda: false, ..Self::default() });
-            }
             None => Preset::default(),
         };
         let mut base = preset.config();

@@ -1,3 +1,5 @@
+use pocketsplat_capture::dataset::Background;
+
 use super::*;
 use pocketsplat_trainer::train::modules::pruning;
 
@@ -52,19 +54,6 @@ fn a_configuration_begins_where_a_run_without_one_begins() {
     assert_eq!(display.capture.max_resolution, None, "one way to say the size replaces the other");
     let masks = RunConfig::parse("unset = [\"train.modules.rdo\"]\ntrain.hac.lambda = 0.001").unwrap();
     assert!(masks.train.modules.rdo.is_none() && !masks.scales_lambda);
-}
-
-#[test]
-fn a_run_that_began_before_presets_were_a_key_has_what_it_says() {
-    // As the program wrote it that had no presets in configurations.
-    let old = include_str!("before_presets.toml");
-    let config = RunConfig::parse(old).unwrap();
-    assert_eq!((config.train.iterations, config.train.hac.lambda), (7000, 0.002));
-    assert!(config.train.modules.rdo.is_some() && config.capture.max_resolution == Some(400) && !config.scales_lambda);
-    let (before, after) = (old.find("[train.modules.rdo]").unwrap(), old.find("[encoding]").unwrap());
-    let without = format!("{}{}", &old[..before], &old[after..]).replace("max_resolution = 400\n", "");
-    let config = RunConfig::parse(&without).unwrap();
-    assert!(config.train.modules.rdo.is_none() && config.capture.max_resolution.is_none());
 }
 
 #[test]

@@ -77,14 +77,14 @@ fn what_cannot_be_had_costs_an_earlier_run_nothing() {
     };
     let before = files("a.run");
     let taken = std::net::TcpListener::bind(("127.0.0.1", 0)).unwrap();
-    let port = taken.local_addr().unwrap().port().to_string();
-    for unfit in [["--watch", &port], ["--device", "gpu:99"]] {
+    let watch = format!("--watch={}", taken.local_addr().unwrap().port());
+    for unfit in [&[watch.as_str()][..], &["--device", "gpu:99"]] {
         // Drivers of GPUs complain on stderr where it is not set.
         fails(train(&output).args(unfit).env("XDG_RUNTIME_DIR", &home));
         assert!(files("a.run") == before, "{unfit:?}");
     }
     let mut fork = pocketsplat();
-    fork.arg("train").arg("--from").arg(home.join("a.run")).args(["--at", "10", "--watch", &port, "-o"]);
+    fork.arg("train").arg("--from").arg(home.join("a.run")).args(["--at", "10", &watch, "-o"]);
     fails(fork.arg(home.join("b.psb")));
     assert!(!home.join("b.run").join("config.toml").exists(), "nothing was begun");
     let error = fails(&mut train(&home));

@@ -22,7 +22,7 @@ fn train(output: &Path) -> Command {
 #[test]
 fn an_interrupted_run_ends_in_the_same_file_which_is_measured_and_drawn() {
     let home = folder("explicit");
-    let (whole, output, run) = (home.join("whole.ply"), home.join("a.ply"), home.join("a.run"));
+    let (whole, output, run) = (home.join("whole.ply"), home.join("a.ply"), home.join("a.ply.run"));
     let result = train(&whole).output().unwrap();
     assert!(result.status.success());
     let result: serde_json::Value = serde_json::from_slice(&result.stdout).unwrap();
@@ -62,7 +62,7 @@ fn what_makes_no_sense_is_refused_in_a_sentence() {
         assert!(said.contains(option) && said.contains("3dgs"), "{said}");
     }
     assert!(fails(&mut train(&home.join("a.psb"))).contains(".ply"));
-    assert!(!home.join("a.run").exists(), "nothing was begun");
+    assert!(!home.join("a.ply.run").exists(), "nothing was begun");
     fs::write(&output, "nothing").unwrap();
     assert!(fails(pocketsplat().arg("fit").arg(&output)).contains("pocketsplat import"));
 }

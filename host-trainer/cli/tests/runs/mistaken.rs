@@ -329,3 +329,77 @@ fn a_run_and_its_bundle_are_told_apart() {
         assert!(fails(pocketsplat().arg(command).arg(capture())).contains("is a folder; give a bundle (.psb)"));
     }
 }
+
+#[test]
+fn a_white_backdrop_is_no_other_background() {
+    let home = folder("mistaken-backdrop");
+    let white = home.join("white");
+    succeeds(pocketsplat().arg("synth").arg(&white).args(["--size", "32", "--train-views", "8", "--seed", "3"]));
+    for split in ["train", "test"] {
+        for entry in fs::read_dir(white.join(split)).unwrap().map(Result::unwrap) {
+            let mut picture = image::open(entry.path()).unwrap().into_rgba8();
+            for pixel in picture.pixels_mut() {
+                let alpha = u32::from(pixel.0[3]);
+                pixel.0 = pixel.0.map(|c| ((u32::from(c) * alpha + 255 * (255 - alpha)) / 255) as u8);
+                pixel.0[3] = 255;
+            }
+            image::DynamicImage::from(picture).into_rgb8().save(entry.path()).unwrap();
+        }
+    }
+    let (bundle, run) = (home.join("w.psb"), home.join("w.run"));
+    succeeds(pocketsplat().arg("train").arg(&white).arg("-o").arg(&bundle).args(["--iterations", "20", "--no-report"]));
+    succeeds(pocketsplat().arg("compare").arg(&run).arg("-o").arg(home.join("c")));
+    let output = pocketsplat().arg("eval").arg(&bundle).arg(&white).output().unwrap();
+    assert!(text(&output.stdout).contains("background white"), "{}", text(&output.stdout));
+    let said = fails(pocketsplat().arg("eval").arg(&bundle).arg(&white).args(["--background", "white"]));
+    assert!(said.contains("was trained on black, not on white; leave --background out"), "{said}");
+    let mut explicit = pocketsplat();
+    explicit.arg("train").arg(&white).arg("-o").arg(home.join("w3.ply")).args([
+        "--backbone",
+        "3dgs",
+        "--iterations",
+        "20",
+    ]);
+    let output = explicit.output().unwrap();
+    let said = text(&output.stderr);
+    assert!(output.status.success() && said.contains("-o scene.psb --background white"), "{said}");
+}
+
+#[test]
+fn two_files_of_one_stem_are_two_runs() {
+    let home = folder("mistaken-stem");
+    let (run, bundle) = copied_run(&home);
+    let result = fs::read(run.join("result.json")).unwrap();
+    let explicit = |options: &[&str]| {
+        let mut command = pocketsplat();
+        command.arg("train").arg(capture()).arg("-o").arg(home.join("a.ply"));
+        command.args(["--backbone", "3dgs", "--iterations", "5"]).args(options);
+        command
+    };
+    succeeds(&mut explicit(&[]));
+    let other = home.join("a.ply.run");
+    for command in [&["report"][..], &["train", "-o", "c.psb", "--at", "2", "--from"]] {
+        let said = fails(pocketsplat().args(command).arg(&other));
+        assert!(said.contains("is of a run of --backbone 3dgs"), "{command:?}: {said}");
+    }
+    let in_vain = fails(&mut explicit(&["--run", run.to_str().unwrap()]));
+    let needed = format!("is the folder of the run that wrote {}; choose another folder with --run", bundle.display());
+    assert!(in_vain.contains(&needed), "{in_vain}");
+    assert_eq!(fs::read(run.join("result.json")).unwrap(), result);
+    succeeds(&mut explicit(&["--overwrite", "--run", run.to_str().unwrap()]));
+}
+
+#[test]
+fn what_is_asked_for_in_vain_is_told_before_a_run() {
+    let home = folder("mistaken-before");
+    let said = fails(pocketsplat().args(["train", "--watch", "/gone", "-o"]).arg(home.join("a.psb")));
+    assert!(said.contains("/gone"), "--watch takes no capture for its port: {said}");
+    let mut dry = pocketsplat();
+    let output = dry.arg("train").arg(capture()).args(["-o", "a.psb", "--dry-run", "--json"]).output().unwrap();
+    assert!(!output.status.success() && text(&output.stderr).contains("cannot be used with '--json'"));
+    let plan = home.join("plan.toml");
+    let scene = format!("published = \"gone.csv\"\n[captures.own]\nscene = {:?}\n", capture());
+    fs::write(&plan, scene + "[options]\niterations = 5\n").unwrap();
+    let said = fails(pocketsplat().arg("plan-runs").arg(&plan).arg("--run").arg("-o").arg(home.join("o")));
+    assert!(said.contains("could not read the published results") && !home.join("o").exists(), "{said}");
+}

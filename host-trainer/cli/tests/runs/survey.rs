@@ -78,7 +78,7 @@ fn a_survey_that_is_killed_goes_on_and_ends_in_the_same_table() {
     assert!(said.contains("the figures are of pocketsplat 0.0.9 r1"), "{said}");
     assert_eq!(table(&killed), rows);
     assert!(!fs::read_to_string(&kept).unwrap().contains("0.0.9"));
-    for run in ["3dgs.run", "contextgs-lambda=0.004.run"] {
+    for run in ["3dgs.ply.run", "contextgs-lambda=0.004.run"] {
         let result = killed.join(run).join("result.json");
         let ours = fs::read_to_string(&result).unwrap();
         fs::write(&result, by_another(&ours)).unwrap();

@@ -1,6 +1,7 @@
 //! The header: version, count, degree, and how many bytes each Gaussian has in each section.
 
-use super::half;
+use half::f16;
+
 use crate::{Degree, Unreadable};
 
 /// Bytes of the header up to version 3; version 4 begins with the same ones.
@@ -73,7 +74,7 @@ impl Header {
     /// The centre in its row.
     pub(super) fn centre(&self, row: &[u8]) -> [f32; 3] {
         if self.version == 1 {
-            return [0, 1, 2].map(|axis: usize| half::to_f32(u16::from_le_bytes([row[2 * axis], row[2 * axis + 1]])));
+            return [0, 1, 2].map(|axis: usize| f16::from_le_bytes([row[2 * axis], row[2 * axis + 1]]).to_f32());
         }
         let scale = 1.0 / (1u32 << self.fraction_bits) as f32;
         [0, 1, 2].map(|axis: usize| {

@@ -110,11 +110,6 @@ impl Effect {
         }
     }
 
-    /// Those of [`Self::MEASURED`] that a run has.
-    pub fn measured_in(config: &TrainConfig) -> Vec<Self> {
-        Self::MEASURED.into_iter().filter(|effect| effect.is_in(config)).collect()
-    }
-
     /// `config` with these of [`Self::MEASURED`] and no other; what is not measured stays.
     pub fn measured_only(effects: &[Self], config: &TrainConfig) -> TrainConfig {
         let mut config = *config;
@@ -152,9 +147,9 @@ mod tests {
         for bits in 0..16 {
             let wanted: Vec<Effect> = (0..4).filter(|i| bits >> i & 1 == 1).map(|i| Effect::MEASURED[i]).collect();
             let config = Effect::measured_only(&wanted, &given);
-            assert_eq!((Effect::measured_in(&config), Effect::all_in(&config)), (wanted.clone(), wanted));
+            assert_eq!(Effect::all_in(&config), wanted);
             assert_eq!(config.modules.shape(config.shape), config.shape);
-            assert_eq!(Effect::measured_only(&Effect::measured_in(&given), &config), given, "nothing else changes");
+            assert_eq!(Effect::measured_only(&Effect::all_in(&given), &config), given, "nothing else changes");
         }
     }
 }

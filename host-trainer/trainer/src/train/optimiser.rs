@@ -303,7 +303,7 @@ mod tests {
             [anchors, heads].concat().try_into().expect("eight groups")
         };
         // Features, log-scales, offsets and masks (times the extent), then the heads of opacity, covariance, colour and detail.
-        let starts = [0.0075, 0.007, 0.02, 0.02, 0.002, 0.004, 0.008, 0.008];
+        let starts = [0.015, 0.007, 0.02, 0.02, 0.002, 0.004, 0.008, 0.008];
         let ends = [0.0005, 0.0005, 0.002, 0.0002, 0.0002, 0.0004, 0.0008, 0.0008];
         let masks_at = |progress: f64| 0.02 * 0.01f64.powf(progress);
         for (progress, expected) in

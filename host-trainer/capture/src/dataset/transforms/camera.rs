@@ -21,6 +21,8 @@ const MAX_DISAGREEMENT: f64 = 0.01;
 
 /// The checked lens of a frame for the image file `path`.
 ///
+/// * `numbers_px`: the size that the numbers are for where they say none.
+///
 /// # Errors
 /// [`ViewFault::Lens`] or [`ViewFault::Shape`].
 pub(super) fn lens(
@@ -28,9 +30,10 @@ pub(super) fn lens(
     shared: &Intrinsics,
     path: &Path,
     header: &ImageHeader,
+    numbers_px: (u32, u32),
 ) -> Result<Lens, ViewFault> {
     let either = |number: fn(&Intrinsics) -> Option<f64>| number(own).or_else(|| number(shared));
-    let size_px = size(own, shared, header.size_px)?;
+    let size_px = size(own, shared, numbers_px)?;
     let focal_px = focal(own, shared, size_px)?;
     let central = Lens::central(size_px, focal_px);
     let lens = Lens {
@@ -187,7 +190,8 @@ mod tests {
     /// Size, focal lengths and principal point of the lens for an image of 48×36 px, or what is wrong.
     fn found(own: &str, shared: &str) -> Result<([f64; 2], [f64; 2]), String> {
         let read = |fields: &str| serde_json::from_str::<Intrinsics>(&format!("{{{fields}}}")).expect("intrinsics");
-        let lens = lens(&read(own), &read(shared), Path::new("a.png"), &HEADER).map_err(|fault| fault.to_string())?;
+        let lens = lens(&read(own), &read(shared), Path::new("a.png"), &HEADER, HEADER.size_px)
+            .map_err(|fault| fault.to_string())?;
         assert_eq!(lens.size_px, HEADER.size_px);
         Ok((lens.focal_px, lens.principal_px))
     }

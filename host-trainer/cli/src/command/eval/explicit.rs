@@ -4,7 +4,7 @@ use anyhow::{Result, bail};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Capture, Split, View};
 
-use super::super::capture::views_of;
+use super::super::capture::{background_of, views_of};
 use super::super::gaussians::GaussiansFile;
 use super::super::output;
 use super::drawn::{drawn_views, mean, view_evaluations};
@@ -95,7 +95,7 @@ pub(crate) fn measure(
         renderer: RENDERER.to_owned(),
         width_px,
         height_px,
-        background: options.background.map_or_else(String::new, |b| b.to_string()),
+        background: background_of(loaded),
         decode_s: file.read_s,
         render_s_per_view: rows[0].seconds,
         scratch_bytes: 0,

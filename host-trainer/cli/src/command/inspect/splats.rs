@@ -4,7 +4,7 @@ use anyhow::{Result, bail};
 use pocketsplat_gaussians::{Account, Format, Gaussians, SpzAxes};
 use serde::Serialize;
 
-use super::super::gaussians::GaussiansFile;
+use super::super::gaussians::{GaussiansFile, VERTICAL_AXIS};
 use super::super::output;
 use super::Args;
 
@@ -15,8 +15,6 @@ const STRAY: f64 = 10.0;
 /// Opacities below and above it are called faint and opaque.
 const FAINT: f64 = 0.1;
 const OPAQUE: f64 = 0.9;
-/// Begins the comment that says which axis is vertical, as other programs write it too.
-const VERTICAL_AXIS: &str = "Vertical axis:";
 
 /// What a file of Gaussians holds; lengths are in units of the file.
 #[derive(Debug, Serialize)]

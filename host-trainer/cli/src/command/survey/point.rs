@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, ensure};
 use pocketsplat_capture::dataset::Image;
 use pocketsplat_trainer::revision_of;
+use pocketsplat_trainer::train::run::RunFolder;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::command::eval::Evaluation;
@@ -42,7 +43,7 @@ impl RunResult {
 }
 
 fn result_of(output: &Path) -> PathBuf {
-    output.with_extension("run").join("result.json")
+    RunFolder::beside(output).join("result.json")
 }
 
 /// Whether a program, as tables name it, trains as this one does.

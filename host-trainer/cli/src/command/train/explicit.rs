@@ -15,7 +15,7 @@ use pocketsplat_trainer::explicit::frame;
 use pocketsplat_trainer::train::run::{Ending, LoggedStep, RunError, RunFolder};
 use serde::Serialize;
 
-use super::super::capture::CaptureArgs;
+use super::super::capture::{CaptureArgs, background_of};
 use super::super::eval::explicit::measure;
 use super::super::eval::{Evaluation, Measurements};
 use super::super::gaussians::{GaussiansFile, write_gaussians};
@@ -145,7 +145,7 @@ fn load(config: &ExplicitRunConfig, run: &Path) -> Result<Capture> {
 /// # Errors
 /// Another process works in the folder, or the run in it is not the one that is asked for.
 pub(crate) fn trained(config: &ExplicitRunConfig, capture: &Capture, stop: &AtomicBool) -> Result<bool> {
-    let path = config.output.with_extension("run");
+    let path = RunFolder::beside(&config.output);
     let (folder, trainer) = match RunFolder::reopen(&path) {
         Ok(folder) => {
             refuse_other(&folder.config()?, config, &path)?;
@@ -201,8 +201,7 @@ fn train(
     let (_, path) = args.named_paths(&config.dataset, &config.output);
     print_or(&result, args.json(), result.summary(path))?;
     if output.is_file() {
-        let background = config.capture.background.filter(|background| *background != Background::Black);
-        let behind = background.map_or(String::new(), |background| format!(" --background {background}"));
+        let behind = if result.background == Background::White.to_string() { " --background white" } else { "" };
         say!("compress it:  pocketsplat import {} -o scene.psb{behind}", shell_word(path));
     }
     Ok(ExitCode::SUCCESS)
@@ -273,7 +272,7 @@ fn write(
         train_processor_s: trainer.processor_seconds(),
         iterations_per_s: f64::from(trainer.iteration()) / trainer.seconds(),
         photographs_waited_share: trainer.waited_share(),
-        background: config.capture.background.unwrap_or(Background::Black).to_string(),
+        background: background_of(capture),
         peak_memory_bytes: peak_memory_bytes(),
         held_out,
         protocol,

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use pocketsplat_capture::dataset::{Background, Capture, Split, View};
+use pocketsplat_capture::dataset::{Capture, Split, View};
 use pocketsplat_files::{Output, shell_word};
 use pocketsplat_format::bundle::crc32;
 use pocketsplat_instructions::level::Profile;
@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use super::limits;
 use crate::command::bundle::BundleFile;
+use crate::command::capture::background_name;
 use crate::command::eval::{Evaluation, Measurements, Renderer, ViewEvaluation, measure};
 use crate::command::process::peak_memory_bytes;
 use crate::config::{CaptureOptions, Protocol};
@@ -176,8 +177,7 @@ pub(super) fn write_bundle(
         train_processor_s: trainer.processor_seconds(),
         iterations_per_s: f64::from(trainer.iteration()) / trainer.seconds(),
         photographs_waited_share: trainer.waited_share(),
-        background: Background::of_rgb8(background)
-            .map_or_else(|| format!("{background:?}"), |known| known.to_string()),
+        background: background_name(background),
         effects: Effect::names(&Effect::all_in(trainer.config())),
         exposures: trainer.exposure_stops().map(|stops| {
             let of_view = |(view, stops): (&View, [f64; 3])| ViewExposure { view: view.name.clone(), stops };

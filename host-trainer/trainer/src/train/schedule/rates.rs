@@ -80,7 +80,7 @@ impl Default for Rates {
         let decaying = |start, end| LearningRate { start, end, from: DECAY_FROM };
         Self {
             offset: decaying(0.01, 1e-3),
-            feature: decaying(0.0075, 5e-4),
+            feature: decaying(0.015, 5e-4),
             log_scale: decaying(0.007, 5e-4),
             opacity_head: decaying(0.002, 2e-4),
             covariance_head: decaying(0.004, 4e-4),

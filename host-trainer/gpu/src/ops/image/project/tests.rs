@@ -1,24 +1,11 @@
 //! Against the CPU. Bounds: both compute the same sums of at most nine products in f32, so they differ by some 1e-6 of the largest
 //! product; needles and grazing Gaussians lose two digits of it to differences, the gradients another one.
 
-use glam::{DMat3, DVec3};
-use pocketsplat_capture::camera::Camera;
-
 use super::*;
+use crate::ops::image::prefilter::tests::camera;
 use crate::parity::{Bound, SIZES, assert_close, gpu, largest};
 use pocketsplat_kernels::finite_difference::random;
 use pocketsplat_kernels::ops::image::project as cpu;
-
-fn camera() -> Pinhole<f32> {
-    Pinhole::new(&Camera {
-        rotation: DMat3::from_rotation_y(0.3) * DMat3::from_rotation_x(-0.4),
-        translation: DVec3::new(0.1, -0.2, 2.0),
-        focal_px: [120.0, 110.0],
-        principal_px: [52.0, 47.0],
-        width_px: 100,
-        height_px: 96,
-    })
-}
 
 fn random_gaussians(n: usize) -> Vec<Gaussian<f32>> {
     let of = |v: &[f64]| {

@@ -107,7 +107,7 @@ impl RunError {
 
 /// Which folder is one, where another path was given: that of a bundle by its name, where it is there.
 fn run_beside(path: &Path) -> String {
-    let beside = path.with_extension("run");
+    let beside = super::RunFolder::beside(path);
     let is_one = beside != path && beside.join(super::CONFIG).is_file();
     let unnamed = "the folder that `train` made beside the bundle, OUT.run";
     if is_one { shell_word(&beside) } else { unnamed.to_owned() }

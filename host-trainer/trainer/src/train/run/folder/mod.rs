@@ -36,6 +36,7 @@ pub use resumable::Resumable;
 pub use store::{Newest, Resumed, fork};
 
 use super::{Observer, Trainer};
+use pocketsplat_files::beside;
 use pocketsplat_kernels::step::StepReport;
 use previews::{PREVIEWS, Previews};
 
@@ -93,6 +94,13 @@ pub struct RunFolder {
 }
 
 impl RunFolder {
+    /// Where the run that writes `output` works unless it is told: `OUT.run` for a bundle, and `OUT.ply.run` for another file, so that
+    /// Gaussians and the bundle made of them have a folder each.
+    pub fn beside(output: &Path) -> PathBuf {
+        let is_bundle = output.extension().is_none_or(|extension| extension.eq_ignore_ascii_case("psb"));
+        if is_bundle { output.with_extension("run") } else { beside(output, ".run") }
+    }
+
     /// Takes the folder `path` for a new run and keeps its configuration there; makes the folder where there is none.
     ///
     /// What a finished run left there is replaced; an unfinished one only with `overwrite`.
@@ -146,7 +154,10 @@ impl RunFolder {
     }
 
     fn refuse_unfinished(&self, overwrite: bool) -> Result<(), RunError> {
-        if !overwrite && !self.is_finished() && !self.checkpoints()?.is_empty() {
+        // Pilots take hours too.
+        let has_begun =
+            !self.checkpoints()?.is_empty() || fs::metadata(self.pilots()).is_ok_and(|found| found.len() > 0);
+        if !overwrite && !self.is_finished() && has_begun {
             return Err(RunError::Unfinished { path: self.path.clone() });
         }
         Ok(())

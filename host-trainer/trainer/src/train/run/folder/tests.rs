@@ -192,6 +192,17 @@ fn checkpoints_by_time_wait_for_their_time() {
 }
 
 #[test]
+fn effects_that_are_being_measured_are_a_run_too() {
+    let home = tempfile::tempdir().unwrap();
+    let path = home.path().join("a.run");
+    let folder = RunFolder::start(&path, "", false).unwrap();
+    std::fs::write(folder.pilots(), "one pilot\n").unwrap();
+    drop(folder);
+    assert!(matches!(RunFolder::start(&path, "", false), Err(RunError::Unfinished { .. })));
+    RunFolder::start(&path, "", true).unwrap();
+}
+
+#[test]
 fn an_unfinished_run_is_not_overwritten_by_accident() {
     let home = tempfile::tempdir().unwrap();
     let path = home.path().join("a.run");

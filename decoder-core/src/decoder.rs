@@ -170,7 +170,7 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
     /// streamed anchors may come after some. After any of them the decoder draws the next frame as if nothing had been.
     ///
     /// # Budget
-    /// No memory beyond the bound one, under 4 KiB of stack. Work of one strip: every anchor of a chunk in view is decoded
+    /// No memory beyond the bound one, under 5 KiB of stack. Work of one strip: every anchor of a chunk in view is decoded
     /// unless it is resident, the heads run for anchors that pass the prefilter, unless Gaussians are baked, and a pixel is finished when its
     /// transmittance falls below 1e-4. Of several strips each does so for the chunks and anchors that can reach it, as many of them at once as
     /// there are places for; but the first time goes over the whole view to see that all strips have places enough, unless that follows
@@ -253,7 +253,7 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
     /// [`DecodeError::OutOfRange`] for a frame larger than planned and [`DecodeError::BadFloat`] for an unusable camera.
     ///
     /// # Budget
-    /// No memory beyond the bound one, but for the drawing itself, under 1 KiB. A look at each record of the directory for each strip;
+    /// No memory beyond the bound one, but for the drawing itself, 1.1 KiB. A look at each record of the directory for each strip;
     /// where damage is skipped in slabs, also the checksums of the chunks in view.
     pub fn begin(&mut self, camera: &Camera) -> Result<Drawing<'_, 'b, 's, A>, DecodeError> {
         let view = self.view_of(camera)?;

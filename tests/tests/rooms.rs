@@ -28,7 +28,7 @@ const CRATES: [(&str, &[&str]); 15] = [
             "display",
         ],
     ),
-    ("host-trainer/files/src", &["kind", "shell", "ply", "output"]),
+    ("host-trainer/files/src", &["kind", "shell", "reach", "ply", "output"]),
     ("host-trainer/capture/src", &["camera", "dataset", "synth"]),
     (
         "host-trainer/gaussians/src",

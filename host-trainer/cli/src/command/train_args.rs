@@ -202,7 +202,7 @@ impl Args {
         // Widths, tiers and λ of a configuration are its own: what a device affords is chosen without one.
         let is_for_device = !limits.is_none() && self.config.is_none() && self.from.is_none();
         if is_for_device {
-            base.effects.price = Price::for_device();
+            base.effects.price = Price::within(&limits);
         }
         let mut config = self.applied_to(base)?;
         config.scales_lambda &= self.lambda.is_none() && !is_for_device;

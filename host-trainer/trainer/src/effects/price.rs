@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::device::Limits;
+
 /// What the scene of a pilot is worth and takes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PilotFigures {
@@ -55,6 +57,13 @@ impl Price {
         Self { effect_db: 0.05, instructions_db: 0.05, bytes_db: 0.05 }
     }
 
+    /// Within limits: as for a device, but that instructions count for nothing where bytes alone are limited, as those of a download are.
+    pub fn within(limits: &Limits) -> Self {
+        let is_size_alone = Limits { flash_bytes: None, ..*limits }.is_none();
+        let device = Self::for_device();
+        if is_size_alone { Self { instructions_db: 0.0, ..device } } else { device }
+    }
+
     /// What `with`, a scene with `n_effects`, has to gain over `without`, a scene without any, dB:
     /// `max(effect_db · n, chance_db) + instructions_db · 10·(I/I₀ − 1) + bytes_db · 10·(B/B₀ − 1)`.
     ///
@@ -100,6 +109,15 @@ mod tests {
         let (n, with) = trial(2, 0.0, 60e6, 110_000);
         assert!((price.of(n, &with, &NONE.1, 0.0) - (0.10 + 0.08 + 0.03)).abs() < 1e-12);
         assert!((price.of(n, &with, &NONE.1, 0.3) - (0.30 + 0.08 + 0.03)).abs() < 1e-12, "chance");
+    }
+
+    #[test]
+    fn bytes_alone_are_no_device() {
+        let bytes = Limits { flash_bytes: Some(300_000), ..Limits::default() };
+        assert_eq!(Price::within(&bytes), Price { instructions_db: 0.0, ..Price::for_device() });
+        for limits in [Limits { ram_bytes: Some(1 << 18), ..bytes }, Limits { level: Some(5), ..Limits::default() }] {
+            assert_eq!(Price::within(&limits), Price::for_device());
+        }
     }
 
     #[test]

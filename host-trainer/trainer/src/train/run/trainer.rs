@@ -132,7 +132,8 @@ impl<'a> Trainer<'a> {
         &self.setup.views.cameras
     }
 
-    /// The training views that are held out: nothing of the scene follows from them, so it can be measured with them.
+    /// The training views that are held out: no step sees them, so the scene can be measured with them. Starting points that are matched between
+    /// photographs, pilots of effects and the choice of a coder take them like any other.
     pub fn validation_views(&self) -> impl Iterator<Item = &'a View> + use<'a> {
         let (config, views) = (self.setup.config, &self.setup.capture.train);
         views.iter().enumerate().filter(move |(i, _)| config.holds_out(*i, views.len())).map(|(_, view)| view)

@@ -160,7 +160,7 @@ class Bundles(unittest.TestCase):
                 camera.orbited(angle)
         for limits in ({"ram": -1}, {"tiers": 256}, {"size": (-2, 60)}):
             with self.assertRaisesRegex(pocketsplat.BundleError, "needed: 0 to"):
-                bundle.plan(**limits)  # type: ignore[arg-type]
+                bundle.plan(**limits)
 
     def test_a_fork_does_not_wait_for_threads_that_it_has_not(self) -> None:
         bundle = Bundle.open(GOLDEN / "static.psb")

@@ -153,7 +153,7 @@ class Bundles(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "last row of viewmat is .* transpose it"):
             Camera.from_matrices(bundle.preview.viewmat.T, camera.K, 80, 60)
         for draw in (lambda: bundle.render(camera.resized(70000, 60)), lambda: bundle.gaussians(camera.resized(80, 0))):
-            with self.assertRaisesRegex(pocketsplat.BundleError, "of the camera is"):
+            with self.assertRaisesRegex(pocketsplat.BundleError, r"is (70000|0); needed"):
                 draw()
         for angle in (float("nan"), 1e6):
             with self.assertRaisesRegex(pocketsplat.BundleError, "at most 8192"):

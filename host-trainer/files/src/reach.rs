@@ -23,6 +23,11 @@ pub fn out_of_reach(path: &Path) -> Option<String> {
     }
 }
 
+/// What to say of a file that was not found: it does not exist, or cannot be reached.
+pub fn why_missing(path: &Path) -> String {
+    out_of_reach(path).map_or_else(|| "does not exist".to_owned(), |why| format!("cannot be reached: {why}"))
+}
+
 /// The first of `folder` and the folders at most `depth` below it that cannot be looked into, and why.
 pub fn closed_folder(folder: &Path, depth: u32) -> Option<(PathBuf, String)> {
     if let Some(why) = out_of_reach(folder) {

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use pocketsplat_files::{out_of_reach, shown};
+use pocketsplat_files::{shown, why_missing};
 use rayon::prelude::*;
 
 use super::folder_names::FolderNames;
@@ -107,12 +107,11 @@ fn points(
     let Some(named) = transforms.ply_file_path.as_deref().map(NamedPath::new) else { return Ok(None) };
     let Some(path) = named.file(names, folder, None) else {
         let expected = named.expected(folder, None);
-        let what = out_of_reach(&expected)
-            .map_or_else(|| "does not exist".to_owned(), |why| format!("cannot be reached: {why}"));
         let text = format!(
-            "`ply_file_path` names `{}`, which {what}, so training makes points; restore the point cloud for a \
-             better start, or take `ply_file_path` out",
-            shown(&expected)
+            "`ply_file_path` names `{}`, which {}, so training makes points; restore the point cloud for a better start, or take \
+             `ply_file_path` out",
+            shown(&expected),
+            why_missing(&expected)
         );
         notes.push(Note::warning("missing-points", text));
         return Ok(None);

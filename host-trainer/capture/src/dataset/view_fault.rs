@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use pocketsplat_files::{FileKind, out_of_reach, shown};
+use pocketsplat_files::{FileKind, out_of_reach, shown, why_missing};
 
 use super::PoseFault;
 use super::camera_models::READABLE_MODELS;
@@ -105,9 +105,7 @@ impl ViewFault {
 
     /// The fault of a mask that was not found at `path`.
     pub(super) fn of_missing_mask(path: PathBuf) -> Self {
-        let message =
-            out_of_reach(&path).map_or_else(|| "does not exist".to_owned(), |why| format!("cannot be reached: {why}"));
-        Self::Mask { path, message }
+        Self::Mask { message: why_missing(&path), path }
     }
 
     /// The fault of an image with an unreadable header.

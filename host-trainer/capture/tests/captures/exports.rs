@@ -335,7 +335,7 @@ fn a_focal_length_without_a_size_is_for_photographs_of_full_size() {
 
 #[test]
 fn the_fisheye_lens_of_opensfm_has_four_coefficients() {
-    let shift = |k4: f64| {
+    let pixels = |k4: f64| {
         let fixture = Fixture::new(Kind::Nerfstudio, 9);
         write_opensfm(&fixture);
         let text = std::fs::read_to_string(fixture.at("reconstruction.json")).expect("written");
@@ -343,5 +343,5 @@ fn the_fisheye_lens_of_opensfm_has_four_coefficients() {
         fixture.write("reconstruction.json", text.replace("\"projection_type\": \"perspective\"", &lens));
         photograph(&fixture.load().expect("sound").0.train[0]).image.rgb.clone()
     };
-    assert_ne!(shift(0.0), shift(9.0));
+    assert_ne!(pixels(0.0), pixels(9.0));
 }

@@ -1,4 +1,5 @@
 /* On a PC, with the sanitisers: the golden frames, and calls that must fail without harm. `test NAME=FILE.psb ...` */
+#include <math.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -248,6 +249,8 @@ static void misuse(const uint8_t *bundle, size_t len) {
   CHECK(psb_render(decoder, &camera, refuse, &n_tiles, &report, &message) == PSB_STATUS_STOPPED);
   CHECK(n_tiles == 2 && strstr(message.text, "returned 77"));
   CHECK(psb_render(decoder, &camera, refuse, &n_tiles, NULL, NULL) == PSB_STATUS_OK);
+  CHECK(psb_orbit(&camera, NAN, &camera, &message) == PSB_STATUS_MISUSE && strstr(message.text, "8192"));
+  CHECK(psb_orbit(&camera, -8193.0f, &camera, &message) == PSB_STATUS_MISUSE);
   misordered(decoder, &camera);
   misuse_by_two(bundle, len, budget, &camera);
   camera.rotation[0] += 0.5f;

@@ -253,8 +253,8 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
     /// [`DecodeError::OutOfRange`] for a frame larger than planned and [`DecodeError::BadFloat`] for an unusable camera.
     ///
     /// # Budget
-    /// No memory beyond the bound one, but for the drawing itself, 1.1 KiB. A look at each record of the directory for each strip;
-    /// where damage is skipped in slabs, also the checksums of the chunks in view.
+    /// No memory beyond the bound one, but for the drawing itself, 1.1 KiB. At most 2,048 looks at records of the directory; where
+    /// damage is skipped in slabs, one at each record, and the checksums of the chunks in view.
     pub fn begin(&mut self, camera: &Camera) -> Result<Drawing<'_, 'b, 's, A>, DecodeError> {
         let view = self.view_of(camera)?;
         Ok(self.begin_frame(camera, view))
@@ -267,7 +267,12 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
 
     /// The chunks of the tiers that are drawn.
     fn planned_chunks(&self) -> PlannedChunks<'b> {
-        PlannedChunks::new(self.bundle.chunks(), self.bundle.up_to_tier(self.plan.n_tiers()).n_chunks)
+        PlannedChunks::new(self.bundle.chunks(), self.n_planned_chunks())
+    }
+
+    /// How many they are.
+    fn n_planned_chunks(&self) -> u32 {
+        self.bundle.up_to_tier(self.plan.n_tiers()).n_chunks
     }
 }
 

@@ -67,12 +67,12 @@ fn frames_in_small_steps_are_those_of_render() {
     }
 }
 
-/// Chunks of no bytes: every symbol, and every cell of a block of 16 by 8 by 8, is certain.
-fn hostile(n_chunks: usize) -> Draft {
+/// Chunks of no bytes where `n_anchors` is 1,024: every symbol, and every cell of a block of 16 by 8 by 8, is certain.
+fn hostile(n_chunks: usize, n_anchors: usize) -> Draft {
     let effects = Effects { anisotropic: true, view_colour: true, ..Effects::default() };
     let widths = Widths { features: 4, offsets: 4, colour_hidden: 8, detail_hidden: 0 };
     let n_channels = widths.features + 6 + 3 * widths.offsets;
-    let cells = (0..1024).map(|i| [i & 15, i >> 4 & 7, i >> 7]);
+    let cells = (0..1024).map(|i| [i & 15, i >> 4 & 7, i >> 7]).take(n_anchors);
     let chunk: Vec<Anchor> = cells.map(|cell| Anchor { cell, drawn: 15, symbols: vec![0; n_channels] }).collect();
     let front = Bundle::parse(GOLDEN[0]).expect("a committed bundle is sound").header().preview;
     Draft::of(effects, widths, vec![vec![chunk; n_chunks]], front, 7)
@@ -80,7 +80,7 @@ fn hostile(n_chunks: usize) -> Draft {
 
 #[test]
 fn a_small_file_that_asks_for_hours_is_refused_within_its_budget() {
-    let [some, more] = [1, 101].map(|n_chunks| hostile(n_chunks).file());
+    let [some, more] = [1, 101].map(|n_chunks| hostile(n_chunks, 1024).file());
     assert!(more.len() - some.len() <= 100 * 32, "{} bytes a chunk of 1,024 anchors", (more.len() - some.len()) / 100);
     let bundle = Bundle::parse(&more).expect("sound, as far as a parser can tell");
     let camera = bundle.header().preview;
@@ -97,10 +97,36 @@ fn a_small_file_that_asks_for_hours_is_refused_within_its_budget() {
     }
 }
 
+/// A record of the directory costs 32 bytes and a look, whether its chunk is in view or not.
+#[test]
+fn chunks_out_of_view_are_work_too() {
+    let file = hostile(600, 8).file();
+    let bundle = Bundle::parse(&file).expect("sound");
+    let front = bundle.header().preview;
+    let away = Camera { translation: [0.0, 0.0, -1e4], ..front };
+    let all = Budget::for_frame(front.width_px, front.height_px)
+        .with_max_splats(MaxSplats::AtMost(2000))
+        .with_residency(Residency::Streamed);
+    let of_strips = all.with_strips(Strips::Exactly(4));
+    for (budget, n_looks) in [
+        (all, 600),
+        (all.with_strips(Strips::Exactly(2)), 2 * 2 * 600),
+        (of_strips, 600),
+        (of_strips.with_overflow(Overflow::Slabs), 4 * 600),
+        (of_strips.with_overflow(Overflow::Slabs).skipping_damage(), 5 * 600),
+    ] {
+        let work = n_looks * 300;
+        let (_, report, _) = advanced(&bundle, &budget.with_most_work(work), &away).expect("drawn");
+        assert_eq!(report.instructions(bundle.model_cost()), 0, "nothing is in view: {budget:?}");
+        let error = advanced(&bundle, &budget.with_most_work(work - 1), &away).err();
+        assert!(matches!(error, Some(DecodeError::TooMuchWork { .. })), "{error:?}: {budget:?}");
+    }
+}
+
 /// What damaged chunks took is not in the report, but it is work.
 #[test]
 fn damage_that_is_left_out_is_work_all_the_same() {
-    let mut draft = hostile(10);
+    let mut draft = hostile(10, 1024);
     draft.edit_chunk = Some(|chunk, words| {
         if chunk > 0 {
             words.extend([1, 2])

@@ -69,7 +69,8 @@ pub enum Overflow {
     LeaveOut,
     /// They are drawn later: a strip is produced from near to far, in as many slabs of depth as it takes, each of which goes
     /// over the anchors again, until nothing more can be seen. The frame is the one that more memory would draw; the pixels of
-    /// a whole strip are in memory, 16 bytes each.
+    /// a whole strip are in memory, 16 bytes each. Only where more splats lie at one depth than there are places for are some left out,
+    /// and reported.
     Slabs,
 }
 

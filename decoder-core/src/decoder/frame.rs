@@ -43,13 +43,14 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
         let budget = self.plan.budget();
         let strips = StripLayout::new(camera.height_px, self.plan.n_strips());
         (self.splats.n_indexed, self.splats.places_of_index) = (0, 0);
+        let mut unreported = 0;
         let policy = if budget.overflow == Overflow::Slabs {
             // Decoding costs most, and each of many passes would do it again. Of fewer the first costs more than the others save.
             let is_indexed = strips.len() >= LEAST_STRIPS_INDEXED
                 && self.source.is_streamed()
-                && self.splats.begin_index(self.bundle.up_to_tier(self.plan.n_tiers()).n_chunks);
+                && self.splats.begin_index(self.n_planned_chunks());
             OverflowPolicy::Slabs { index: if is_indexed { IndexState::Due } else { IndexState::None } }
-        } else if strips.len() > 1 && self.surely_fits(&view, strips) {
+        } else if strips.len() > 1 && self.surely_fits(&view, strips, &mut unreported) {
             OverflowPolicy::Fits
         } else {
             let first_come = FirstCome::new(self.splats.places());
@@ -57,7 +58,7 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
         };
         let rule = A::Blending::rule(budget.quality.alpha_cut);
         let cost = self.bundle.model_cost();
-        let mut frame = Frame { view, strips, policy, report: FrameReport::default(), cost, unreported: 0 };
+        let mut frame = Frame { view, strips, policy, report: FrameReport::default(), cost, unreported };
         if self.skips_damage() && matches!(frame.policy, OverflowPolicy::Slabs { .. }) {
             self.note_damage(&mut frame);
         }

@@ -4,6 +4,7 @@ use pocketsplat_format::DecodeError;
 use pocketsplat_format::bundle::{Chunk, ModelCost};
 
 use super::first_come::FirstCome;
+use super::pass::{CHUNK_LOOKED_AT, checksum_work};
 use super::slab_index::IndexState;
 use super::source::{AnchorSource, Anchors, GaussianSource};
 use super::strip::{Strip, StripLayout};
@@ -11,6 +12,9 @@ use super::strips_of_chunks::StripsOfChunks;
 use super::{Decoder, FrameReport};
 use crate::arithmetic::Arithmetic;
 use crate::project::{Band, View};
+
+/// Looks at chunks before a frame, each for a strip.
+const MOST_LOOKED_AT: u64 = 2048;
 
 /// The current frame.
 pub(super) struct Frame {
@@ -20,7 +24,7 @@ pub(super) struct Frame {
     pub(super) report: FrameReport,
     /// What the scene is worth in model instructions.
     pub(super) cost: ModelCost,
-    /// Model instructions that the report does not have: of damaged chunks, checksums, and making room for splats.
+    /// Model instructions that the report does not have: of chunks looked at, damaged chunks, checksums, and making room for splats.
     pub(super) unreported: u64,
 }
 
@@ -82,11 +86,18 @@ impl Frame {
 
 impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
     /// Whether each strip surely has a place for all of its splats: all baked Gaussians, or all offsets of all anchors, of the
-    /// chunks it sees.
+    /// chunks it sees. False for a scene of many chunks, whose first pass finds out.
+    ///
+    /// * `work`: takes in the model instructions.
     ///
     /// # Budget
-    /// About 100 multiplications a chunk and strip; reads the directory alone.
-    pub(super) fn surely_fits(&self, view: &View, strips: StripLayout) -> bool {
+    /// About 100 multiplications a chunk and strip, of [`MOST_LOOKED_AT`] at most; reads the directory alone.
+    pub(super) fn surely_fits(&self, view: &View, strips: StripLayout, work: &mut u64) -> bool {
+        let n_looks = u64::from(self.n_planned_chunks()).saturating_mul(strips.len().into());
+        if n_looks > MOST_LOOKED_AT {
+            return false;
+        }
+        *work = work.saturating_add(n_looks.saturating_mul(CHUNK_LOOKED_AT));
         let n_offsets = u64::from(self.bundle.header().n_offsets);
         strips.iter().all(|strip| {
             let band = view.band(strips.pixels(strip));
@@ -101,13 +112,23 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
         })
     }
 
-    /// Notes the damaged chunks in view, before strips are drawn in slabs, whose passes look at a chunk any number of times.
+    /// Notes the damaged chunks in view, before strips are drawn in slabs, whose passes look at a chunk any number of times. Ends early
+    /// where that takes more work than the budget allows, which is the frame's first error then.
     pub(super) fn note_damage(&self, frame: &mut Frame) {
-        let in_view =
-            self.planned_chunks().map(|(chunk, _)| chunk).filter(|chunk| frame.view.sees_box(chunk.ink_box()));
-        for chunk in in_view.filter(|chunk| !self.is_sound(chunk)) {
-            frame.report.chunks_damaged += 1;
-            frame.report.first_damaged = frame.report.first_damaged.or(Some(chunk.index()));
+        for (chunk, _) in self.planned_chunks() {
+            frame.unreported = frame.unreported.saturating_add(CHUNK_LOOKED_AT);
+            if frame.view.sees_box(chunk.ink_box()) {
+                if self.source.is_streamed() {
+                    frame.unreported = frame.unreported.saturating_add(checksum_work(&chunk));
+                }
+                if frame.unreported > self.plan.budget().most_work {
+                    return;
+                }
+                if !self.is_sound(&chunk) {
+                    frame.report.chunks_damaged += 1;
+                    frame.report.first_damaged = frame.report.first_damaged.or(Some(chunk.index()));
+                }
+            }
         }
     }
 

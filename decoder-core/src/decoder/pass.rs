@@ -21,10 +21,10 @@ use crate::scene::Anchor;
 
 /// Model instructions after which a pass stops for a while, to go on where it was.
 const STEP: u64 = 200_000;
-/// Chunks that it looks at in the meantime, in view or not.
-const CHUNKS_OF_STEP: usize = 256;
+/// Model instructions of a chunk whose place in the directory is looked at, and that is not drawn.
+pub(super) const CHUNK_LOOKED_AT: u64 = 300;
 /// Model instructions of a byte whose checksum is compared.
-const CHECKSUM_BYTE: u32 = 8;
+const CHECKSUM_BYTE: u64 = 8;
 
 /// A pass that is not complete.
 pub(super) struct Pass<'b> {
@@ -56,6 +56,11 @@ struct Before {
     n_splats: u32,
     first_come: Option<FirstCome>,
     report: FrameReport,
+}
+
+/// Model instructions of comparing a chunk's checksum.
+pub(super) fn checksum_work(chunk: &Chunk<'_>) -> u64 {
+    u64::from(saturate(chunk.n_bytes())).saturating_mul(CHECKSUM_BYTE)
 }
 
 impl<'b> PlannedChunks<'b> {
@@ -107,10 +112,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
         watch: &mut impl Stopwatch,
     ) -> Result<bool, DecodeError> {
         let until = frame.instructions().saturating_add(STEP);
-        for _ in 0..CHUNKS_OF_STEP {
-            if frame.instructions() >= until {
-                break;
-            }
+        while frame.instructions() < until {
             if pass.open.is_none() {
                 let Some((chunk, first_anchor)) = pass.chunks.next() else {
                     let Slab { n_left_out, .. } = pass.target.slab;
@@ -123,7 +125,10 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
                 }
             }
             let Pass { target, open, .. } = pass;
-            let Some(chunk) = open else { continue };
+            let Some(chunk) = open else {
+                frame.unreported = frame.unreported.saturating_add(CHUNK_LOOKED_AT);
+                continue;
+            };
             let end = until.saturating_sub(frame.unreported);
             let outcome = self.go_on_in(chunk, target, frame, end, watch);
             frame.unreported = frame.unreported.saturating_add(core::mem::take(&mut self.splats.work));
@@ -177,8 +182,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
             report: frame.report,
         });
         if self.skips_damage() && self.source.is_streamed() {
-            let n_bytes = saturate(chunk.n_bytes());
-            frame.unreported = frame.unreported.saturating_add(u64::from(n_bytes) * u64::from(CHECKSUM_BYTE));
+            frame.unreported = frame.unreported.saturating_add(checksum_work(&chunk));
         }
         if !self.is_sound(&chunk) {
             self.leave_out(&chunk, before.as_ref(), &pass.target, frame);

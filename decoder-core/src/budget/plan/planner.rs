@@ -170,7 +170,7 @@ impl Planner<'_, '_> {
             scratch_len,
             slow_len,
             least_splats: shape.frame.max_splats,
-            pruning_rate: 1.0 - tier.n_anchors as f32 / header.n_anchors.max(1) as f32,
+            pruning_rate: header.n_anchors.saturating_sub(tier.n_anchors) as f32 / header.n_anchors.max(1) as f32,
             work: measures.map(|m| Work::most(&m, header.training_px, budget, passes, &shape)),
         };
         let (head_macs, n_decoded) = match measures {

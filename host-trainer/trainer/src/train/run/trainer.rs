@@ -277,9 +277,13 @@ impl<'a> Trainer<'a> {
         }
     }
 
-    /// The same; rate–distortion pruning then leaves as much as `limits` says fits, and weighs bits accordingly.
+    /// The same; rate–distortion pruning then leaves as much as `limits` says fits, and weighs bits accordingly. Without a limit of
+    /// bytes they weigh what the configuration says, whatever a limit made of it before a fork.
     #[must_use]
     pub fn fitting(mut self, limits: Option<LimitProbe<'a>>) -> Self {
+        if !limits.is_some_and(|limits| limits.limits_bytes) {
+            self.state.learned.lambda = self.setup.config.hac.lambda;
+        }
         self.setup.limits = limits;
         self
     }

@@ -99,6 +99,20 @@ fn a_fork_decides_about_exposures_anew_where_it_is_asked_to() {
 }
 
 #[test]
+fn a_fork_without_a_limit_of_bytes_weighs_bits_as_its_configuration_says() {
+    let capture = tiny_capture();
+    let config = tiny_config(20);
+    let mut begun = Trainer::new(&capture, config).unwrap();
+    begun.state.learned.lambda = 16.0 * config.hac.lambda;
+    let bytes = saved(&begun);
+    let lambda_of = |limits| Trainer::fork(&capture, &bytes, config).unwrap().run.fitting(limits).state.learned.lambda;
+    let probe = |limits_bytes| LimitProbe { measure: &|_| unreachable!("nothing is trained"), limits_bytes };
+    assert_eq!(lambda_of(None), config.hac.lambda);
+    assert_eq!(lambda_of(Some(probe(false))), config.hac.lambda);
+    assert_eq!(lambda_of(Some(probe(true))), 16.0 * config.hac.lambda, "a limit goes on from where it came");
+}
+
+#[test]
 fn a_fork_without_refined_poses_begins_with_those_of_the_capture() {
     let capture = tiny_capture();
     let refining = TrainConfig { refine_poses: true, ..tiny_config(200) };

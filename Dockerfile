@@ -1,4 +1,4 @@
-# The command, which trains on the processor here, and what it drives: COLMAP and ffmpeg for `poses`.
+# The command, which trains on the processor here, and what `poses` drives: COLMAP, ffmpeg and the converter of HEIC.
 #
 #   docker build -t pocketsplat .
 #   docker run --rm -v "$PWD:/work" pocketsplat train PHOTOS -o scene.psb
@@ -11,7 +11,7 @@ RUN cargo install --locked --path host-trainer/cli --root /installed
 
 FROM debian:bookworm-slim
 RUN apt-get update \
-    && apt-get install -y --no-install-recommends colmap ffmpeg \
+    && apt-get install -y --no-install-recommends colmap ffmpeg libheif-examples \
     && rm -rf /var/lib/apt/lists/*
 COPY --from=build /installed/bin/pocketsplat /usr/local/bin/
 WORKDIR /work

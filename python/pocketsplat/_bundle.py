@@ -67,7 +67,7 @@ class Tier:
     pruning_rate: float
     """Share of the anchors that is left out, 0 to 1."""
     psnr_db: float | None
-    """Over held-out training views, where it was measured."""
+    """Over at most 12 test views, or the training views that `validation_every` held out; where it was measured."""
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ class Bundle:
 
     @property
     def preview(self) -> Camera:
-        """The camera that the bundle holds: a training camera that shows the scene well."""
+        """The camera that the bundle holds: the first training camera."""
         return _of_tuple(self._native.preview())
 
     def camera(self, viewmat: ArrayLike, K: ArrayLike, width_px: int, height_px: int) -> Camera:

@@ -1,10 +1,9 @@
 //! What a frame does where there may not be places for all of its splats.
 
-use pocketsplat_format::DecodeError;
 use pocketsplat_format::bundle::{Chunk, ModelCost};
+use pocketsplat_format::{DecodeError, saturate};
 
 use super::first_come::FirstCome;
-use super::pass::{CHUNK_LOOKED_AT, checksum_work};
 use super::slab_index::IndexState;
 use super::source::{AnchorSource, Anchors, GaussianSource};
 use super::strip::{Strip, StripLayout};
@@ -15,6 +14,10 @@ use crate::project::{Band, View};
 
 /// Looks at chunks before a frame, each for a strip.
 const MOST_LOOKED_AT: u64 = 2048;
+/// Model instructions of a chunk whose place in the directory is looked at, and that is not drawn.
+pub(super) const CHUNK_LOOKED_AT: u64 = 300;
+/// Model instructions of a byte whose checksum is compared.
+const CHECKSUM_BYTE: u64 = 8;
 
 /// The current frame.
 pub(super) struct Frame {
@@ -57,6 +60,11 @@ pub(super) fn check_work(needed: u64, most: u64) -> Result<(), DecodeError> {
         return Err(DecodeError::TooMuchWork { needed_so_far, limit });
     }
     Ok(())
+}
+
+/// Model instructions of comparing a chunk's checksum.
+pub(super) fn checksum_work(chunk: &Chunk<'_>) -> u64 {
+    u64::from(saturate(chunk.n_bytes())).saturating_mul(CHECKSUM_BYTE)
 }
 
 /// In units of 1,024.

@@ -5,11 +5,11 @@ use core::marker::PhantomData;
 use core::ops::Range;
 
 use pocketsplat_format::bundle::{Chunk, Chunks, SuspendedReader};
-use pocketsplat_format::{DecodeError, Stage, Stopwatch, saturate};
+use pocketsplat_format::{DecodeError, Stage, Stopwatch};
 
 use super::collect::{GaussianCollector, SplatCollector, Target};
 use super::first_come::FirstCome;
-use super::overflow::{Frame, OverflowPolicy};
+use super::overflow::{CHUNK_LOOKED_AT, Frame, OverflowPolicy, checksum_work};
 use super::share::Share;
 use super::slab_index::IndexState;
 use super::source::{Anchors, GaussianSource};
@@ -21,10 +21,6 @@ use crate::scene::Anchor;
 
 /// Model instructions after which a pass stops for a while, to go on where it was.
 const STEP: u64 = 200_000;
-/// Model instructions of a chunk whose place in the directory is looked at, and that is not drawn.
-pub(super) const CHUNK_LOOKED_AT: u64 = 300;
-/// Model instructions of a byte whose checksum is compared.
-const CHECKSUM_BYTE: u64 = 8;
 
 /// A pass that is not complete.
 pub(super) struct Pass<'b> {
@@ -56,11 +52,6 @@ struct Before {
     n_splats: u32,
     first_come: Option<FirstCome>,
     report: FrameReport,
-}
-
-/// Model instructions of comparing a chunk's checksum.
-pub(super) fn checksum_work(chunk: &Chunk<'_>) -> u64 {
-    u64::from(saturate(chunk.n_bytes())).saturating_mul(CHECKSUM_BYTE)
 }
 
 impl<'b> PlannedChunks<'b> {

@@ -17,7 +17,5 @@ mod trie;
 pub use ans::AnsReader;
 pub use mask::{MaskModel, N_MASK_CONTEXTS};
 pub use model::{FREQUENCY_TOTAL, PRECISION_BITS, Slot, SymbolModel, UniformByte};
-pub use normal::{
-    EIGHTHS, N_NORMAL_SHORT_CUTS, N_PHASES, N_SCALES, NORMAL_WINDOW, NormalModel, SCALE_ONE, SymbolSlots,
-};
+pub use normal::{EIGHTHS, N_PHASES, N_SCALES, NormalModel, SCALE_ONE, SymbolSlots};
 pub use trie::{Children, N_TRIE_CONTEXTS, NodeModel, TrieModel, TrieReader};

@@ -3,7 +3,7 @@
 //! A table holds the frequencies of d = −D..=D under N(phase/8, σ): the mass of [d − ½, d + ½] in units of 2⁻¹², at least
 //! one each, and what is left is the escape's. Scales are σ = 2^((s − 32)/8) with s < 64, so neighbours differ by 9 %;
 //! means are in eighths, of which five tables do, because a mean of −p/8 is the mirror image of +p/8. Means and scales
-//! between those of the tables cost 0.1 % of the bits. `tools/src/bin/normal_tables.rs` writes the tables.
+//! between those of the tables cost 0.1 % of the bits. `tools/src/bin/normal_tables.rs` writes them.
 
 mod tables;
 
@@ -20,11 +20,11 @@ pub const EIGHTHS: i32 = 8;
 pub const N_PHASES: usize = 5;
 
 /// Pieces of the range that have a short cut into the tables.
-pub const N_NORMAL_SHORT_CUTS: usize = 32;
+const N_NORMAL_SHORT_CUTS: usize = 32;
 
 /// Bounds that a model looks at; the longest table has 125. A power of two makes every index a sound one without a
 /// comparison.
-pub const NORMAL_WINDOW: usize = 128;
+const NORMAL_WINDOW: usize = 128;
 
 /// An escape byte up to here holds how far beyond the table, and the sign; above it, the symbol follows as two bytes.
 const ESCAPE_NEAR: u8 = 253;

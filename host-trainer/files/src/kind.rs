@@ -1,7 +1,7 @@
 //! What a file is, told by its first bytes alone.
 
 use std::fmt;
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, Read as _};
 use std::path::Path;
 
@@ -111,6 +111,22 @@ impl FileKind {
         let mut first = Vec::with_capacity(N_FIRST);
         File::open(path)?.take(N_FIRST as u64).read_to_end(&mut first)?;
         Ok(Self::of(&first))
+    }
+
+    /// The bytes of the file at `path`; where the first ones say that nobody wants it, as a film of many gigabytes, these alone. What is
+    /// no regular file, as a pipe, can be read once, and is read whole.
+    ///
+    /// # Errors
+    /// What the system said.
+    pub fn read(path: &Path, is_wanted: impl Fn(Option<Self>) -> bool) -> io::Result<Vec<u8>> {
+        if path.is_file() {
+            let mut first = Vec::with_capacity(N_FIRST);
+            File::open(path)?.take(N_FIRST as u64).read_to_end(&mut first)?;
+            if !is_wanted(Self::of(&first)) {
+                return Ok(first);
+            }
+        }
+        fs::read(path)
     }
 
     /// Of files whose first box is `ftyp`: ISO 14496-12, by the major brand.

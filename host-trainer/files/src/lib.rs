@@ -13,4 +13,4 @@ mod shell;
 pub use kind::FileKind;
 pub use output::{Content, MARK, Output, OutputError, Outputs, write_whole};
 pub use reach::{closed_folder, out_of_reach, why_missing};
-pub use shell::{beside, shell_word, shown};
+pub use shell::{beside, shell_word, shown, unused};

@@ -32,6 +32,24 @@ pub fn beside(path: &Path, ending: &str) -> PathBuf {
     named
 }
 
+/// A name for a file that somebody is told to make: `path`, or where it or its run's folder is there, NAME-2, NAME-3 and so on.
+pub fn unused(path: &Path) -> PathBuf {
+    let is_used = |path: &Path| path.exists() || path.with_extension("run").exists();
+    if !is_used(path) {
+        return path.to_owned();
+    }
+    let numbered = |number: u32| {
+        let mut name = path.file_stem().unwrap_or_default().to_owned();
+        name.push(format!("-{number}"));
+        if let Some(extension) = path.extension() {
+            name.push(".");
+            name.push(extension);
+        }
+        path.with_file_name(name)
+    };
+    (2..=u32::MAX).map(numbered).find(|path| !is_used(path)).unwrap_or_else(|| path.to_owned())
+}
+
 /// Bytes that no text has, as `printf` of POSIX writes them.
 #[cfg(unix)]
 fn printed(path: &Path) -> Option<String> {
@@ -54,6 +72,17 @@ fn printed(_: &Path) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn nobody_is_told_to_make_what_is_there() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let at = |name: &str| folder.path().join(name);
+        assert_eq!(unused(&at("scene.psb")), at("scene.psb"));
+        std::fs::write(at("scene.psb"), "").expect("room");
+        assert_eq!(unused(&at("scene.psb")), at("scene-2.psb"));
+        std::fs::create_dir(at("scene-2.run")).expect("room");
+        assert_eq!(unused(&at("scene.psb")), at("scene-3.psb"), "a run that has no bundle yet");
+    }
 
     #[test]
     fn what_is_made_of_a_folder_stands_beside_it() {

@@ -13,6 +13,10 @@ use crate::{Account, FileError, Format, Gaussians, Notes, SpzAxes, Unreadable, g
 /// What is read, as words.
 const KNOWN: &str = ".ply (also compressed), .spz, .sog (also a folder with its meta.json), .splat and .glb are read";
 
+/// Kinds of files that are read.
+const READ: [FileKind; 6] =
+    [FileKind::Ply, FileKind::Gzip, FileKind::RawSpz, FileKind::Zip, FileKind::Glb, FileKind::Json];
+
 /// Reads the Gaussians of the file or folder at `path`, whatever its name ends in.
 ///
 /// * `spz_axes`: of a .spz, whatever its record says.
@@ -24,8 +28,12 @@ pub fn read(path: &Path, spz_axes: Option<SpzAxes>) -> Result<(Gaussians, Notes)
     if path.is_dir() {
         return read_folder(path, &path.join(META)).map_err(content);
     }
-    let bytes = fs::read(path).map_err(|source| FileError::Read { path: path.to_owned(), source })?;
     let named = ending(path);
+    let is_read = |kind| match kind {
+        Some(kind) => READ.contains(&kind),
+        None => named == "splat",
+    };
+    let bytes = FileKind::read(path, is_read).map_err(|source| FileError::Read { path: path.to_owned(), source })?;
     let (found, result) = match FileKind::of(&bytes) {
         Some(FileKind::Ply) => ("ply", ply::read(&bytes)),
         Some(FileKind::Gzip | FileKind::RawSpz) => ("spz", spz::read(&bytes, spz_axes)),

@@ -32,10 +32,11 @@ impl Format {
     /// The format that a file's name says, whatever its case; `None` for names that say another thing, `.compressed.ply` among them.
     pub fn of_path(path: &Path) -> Option<Self> {
         const COMPRESSED: &str = ".compressed.ply";
-        let name = path.file_name()?.to_str()?.to_ascii_lowercase();
-        let extension = path.extension()?.to_str()?;
+        // The ending is text even where the rest of the name is none.
+        let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
+        let extension = path.extension()?.to_string_lossy();
         let is_written = !name.ends_with(COMPRESSED);
-        Self::ALL.into_iter().find(|format| is_written && format.extension().eq_ignore_ascii_case(extension))
+        Self::ALL.into_iter().find(|format| is_written && format.extension().eq_ignore_ascii_case(&extension))
     }
 }
 
@@ -51,5 +52,16 @@ mod tests {
             (Some(Format::Ply), Some(Format::Spz), None, None)
         );
         assert_eq!(of("a.Compressed.ply"), None);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn the_ending_is_read_of_any_name() {
+        use std::os::unix::ffi::OsStrExt as _;
+        let of = |name: &[u8]| Format::of_path(Path::new(std::ffi::OsStr::from_bytes(name)));
+        assert_eq!(
+            (of(b"caf\xe9.ply"), of(b"caf\xe9.compressed.ply"), of(b"a.caf\xe9"), of(b"caf\xe9")),
+            (Some(Format::Ply), None, None, None)
+        );
     }
 }

@@ -65,7 +65,7 @@ pub enum GpuError {
     },
     /// The driver gave the device up.
     #[error(
-        "the device was lost ({reason}); `--resume` goes on from the checkpoint, with `--device cpu` without this device"
+        "the device was lost ({reason}); `--resume` goes on from the checkpoint, on the CPU, or with `--device gpu`"
     )]
     Lost {
         /// What the driver says.

@@ -138,34 +138,41 @@ fn read_u32(bytes: &[u8], at: usize) -> u32 {
 /// Collects files.
 struct List(Vec<Refused>);
 
+/// A file of a [`List`] that waits for its bytes.
+struct Entry<'a> {
+    list: &'a mut List,
+    name: &'a str,
+    reason: &'a str,
+    expected: &'a str,
+}
+
 impl List {
-    /// A file as it is.
-    fn push(&mut self, name: &str, reason: &str, expected: &str, bytes: Vec<u8>) {
-        let [name, reason, expected] = [name, reason, expected].map(str::to_owned);
-        self.0.push(Refused { name, reason, expected, bytes });
+    /// A file whose bytes the next call gives.
+    fn file<'a>(&'a mut self, name: &'a str, reason: &'a str, expected: &'a str) -> Entry<'a> {
+        Entry { list: self, name, reason, expected }
+    }
+}
+
+impl Entry<'_> {
+    /// These bytes as they are.
+    fn of(self, bytes: Vec<u8>) {
+        let [name, reason, expected] = [self.name, self.reason, self.expected].map(str::to_owned);
+        self.list.0.push(Refused { name, reason, expected, bytes });
     }
 
-    /// A file with other bytes at `at`, sealed again.
-    fn patched(&mut self, name: &str, reason: &str, expected: &str, good: &[u8], at: usize, other: &[u8]) {
+    /// A good file with other bytes at `at`, sealed again.
+    fn patched(self, (good, at): (&[u8], usize), other: &[u8]) {
         let mut bytes = good.to_vec();
-        assert_ne!(&bytes[at..at + other.len()], other, "{name}: nothing changes");
+        assert_ne!(&bytes[at..at + other.len()], other, "{}: nothing changes", self.name);
         bytes[at..at + other.len()].copy_from_slice(other);
         reseal(&mut bytes);
-        self.push(name, reason, expected, bytes);
+        self.of(bytes);
     }
 
     /// The same, `at` counted from the start of a section.
-    fn in_section(
-        &mut self,
-        name: &str,
-        reason: &str,
-        expected: &str,
-        good: &[u8],
-        (kind, at): (u8, usize),
-        other: &[u8],
-    ) {
+    fn in_section(self, (good, kind, at): (&[u8], u8, usize), other: &[u8]) {
         let start = section(good, kind).1.start;
-        self.patched(name, reason, expected, good, start + at, other);
+        self.patched((good, start + at), other);
     }
 }
 

@@ -107,23 +107,12 @@ fn in_frame(page: &str) -> String {
 }
 
 fn start(screen: Screen, browser: &str, address: &str, profile: &Path) -> Browser {
-    const FLAGS: [&str; 12] = [
-        "--headless",
-        "--no-sandbox",
-        "--disable-gpu",
-        "--disable-quic",
-        "--no-first-run",
-        "--disable-background-networking",
-        "--disable-component-update",
-        "--disable-sync",
-        "--disable-dev-shm-usage",
-        "--window-size=1280,800",
-        "--enable-logging=stderr",
-        "--v=0",
-    ];
+    const FLAGS: &str = "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run \
+        --disable-background-networking --disable-component-update --disable-sync --disable-dev-shm-usage \
+        --window-size=1280,800 --enable-logging=stderr --v=0";
     let mut command = Command::new(browser);
     command.arg(format!("--blink-settings=preferredColorScheme={}", u8::from(!screen.is_dark)));
-    command.args(FLAGS).arg(format!("--user-data-dir={}", profile.display())).arg(address);
+    command.args(FLAGS.split_whitespace()).arg(format!("--user-data-dir={}", profile.display())).arg(address);
     Browser(command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("started"))
 }
 

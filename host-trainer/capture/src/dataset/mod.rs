@@ -84,7 +84,7 @@ pub use frame_size::{FrameSize, NoFrameSize};
 pub use layout::Layout;
 pub use made_points::PointsFile;
 pub use mask::Mask;
-pub use options::{Background, LoadOptions, MOST_IN_MEMORY_BYTES, PointsChoice};
+pub use options::{Background, LoadOptions, MOST_IN_MEMORY_BYTES, MOST_RANDOM_POINTS, PointsChoice};
 pub use photograph::Photograph;
 pub use pose::PoseFault;
 pub use report::{LoadReport, SkippedView};

@@ -77,8 +77,8 @@ impl fmt::Display for PointsChoice {
     }
 }
 
-/// A hundred times the published number of explicit Gaussians, a thousand times that of anchors.
-const MOST_RANDOM_POINTS: usize = 10_000_000;
+/// Random points that are made at most: a hundred times the published number of explicit Gaussians, a thousand times that of anchors.
+pub const MOST_RANDOM_POINTS: usize = 10_000_000;
 
 /// How to load a capture.
 #[derive(Clone, Debug, PartialEq)]

@@ -51,15 +51,15 @@ struct Case {
 /// Views of the sound capture: two are held out.
 const N_VIEWS: usize = 12;
 
-fn case(
-    name: &'static str,
-    kind: Kind,
-    harm: Harm,
-    code: &'static str,
-    says: &'static [&'static str],
-    write: fn(&mut Fixture),
-) -> Case {
-    Case { name, kind, write, harm, code, says }
+fn case(name: &'static str, kind: Kind, harm: Harm, code: &'static str, write: fn(&mut Fixture)) -> Case {
+    Case { name, kind, write, harm, code, says: &[] }
+}
+
+impl Case {
+    /// Sets the parts of the message.
+    fn says(self, says: &'static [&'static str]) -> Self {
+        Self { says, ..self }
+    }
 }
 
 /// Keeps the first bytes of a written file.

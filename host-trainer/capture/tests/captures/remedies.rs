@@ -46,14 +46,14 @@ fn named(message: &str, behind: &str) -> PathBuf {
     PathBuf::from(before.trim_end_matches('`').rsplit('`').next().expect("a name in backticks"))
 }
 
-fn trouble(
-    name: &'static str,
-    kind: Kind,
-    remedy: &'static str,
-    break_it: fn(&mut Fixture),
-    mend: fn(&mut Fixture, &str) -> (PathBuf, LoadOptions),
-) -> Trouble {
-    Trouble { name, kind, break_it, remedy, mend }
+fn trouble(name: &'static str, kind: Kind, break_it: fn(&mut Fixture)) -> Trouble {
+    Trouble { name, kind, break_it, remedy: "", mend: |fixture, _| again(fixture) }
+}
+
+impl Trouble {
+    fn remedy(self, remedy: &'static str, mend: fn(&mut Fixture, &str) -> (PathBuf, LoadOptions)) -> Self {
+        Self { remedy, mend, ..self }
+    }
 }
 
 /// Does what it says: before, the remedy is printed; afterwards all views load and nobody prints it.

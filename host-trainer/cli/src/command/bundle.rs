@@ -37,7 +37,8 @@ impl BundleFile {
             };
             bail!("{} is the folder of a run; give its bundle, {}", path.display(), run.output.display());
         }
-        let bytes = std::fs::read(path).with_context(|| format!("could not read the bundle {}", path.display()))?;
+        let bytes = FileKind::read(path, |kind| kind == Some(FileKind::Bundle));
+        let bytes = bytes.with_context(|| format!("could not read the bundle {}", path.display()))?;
         if let Some(kind) = FileKind::of(&bytes).filter(|kind| *kind != FileKind::Bundle) {
             let remedy = kind.remedy().unwrap_or("give a .psb file");
             bail!("{} is {kind}, needed: a bundle (.psb); {remedy}", path.display());

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{self, Background, Capture, LoadOptions, PointsChoice, Split, View};
-use pocketsplat_files::shell_word;
+use pocketsplat_files::{shell_word, unused};
 use pocketsplat_trainer::train::run::{photographs_in, points_in};
 
 use crate::config::CaptureOptions;
@@ -15,8 +15,9 @@ pub(crate) fn refuse_gaussians(path: &Path) -> Result<()> {
     if pocketsplat_gaussians::is_one(path) {
         let word = shell_word(path);
         bail!(
-            "{} is a file of Gaussians, no bundle and no capture; make a bundle of it with `pocketsplat import {word} -o scene.psb`",
-            path.display()
+            "{} is a file of Gaussians, no bundle and no capture; make a bundle of it with `pocketsplat import {word} -o {}`",
+            path.display(),
+            shell_word(&unused(Path::new("scene.psb")))
         );
     }
     Ok(())

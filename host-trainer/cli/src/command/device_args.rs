@@ -19,8 +19,8 @@ const MOST_BYTES: u64 = u32::MAX as u64;
 /// What the device has that the bundle is for; what else the command line leaves open is chosen by it.
 #[derive(clap::Args)]
 pub(crate) struct DeviceArgs {
-    /// Device class 1 (64 KiB) to 5 (8 MiB): sets the processor and --ram, --flash and --resolution, which may ask for less
-    /// [default: none]
+    /// Device class 1 (64 KiB) to 5 (8 MiB): sets --ram, --flash and --resolution, which may ask for less, and up to level 4 the
+    /// processor [default: none]
     #[arg(long, value_name = "N", value_parser = level_number(), help_heading = DEVICE)]
     level: Option<u8>,
     /// Scratch bytes of the decoder, as 192KiB, excluding stack and frame buffer; the whole scene is guaranteed to fit

@@ -17,7 +17,6 @@ use pocketsplat_files::{Output, shell_word};
 use pocketsplat_format::Bundle;
 use pocketsplat_gaussians::{Degree, Format, Frame, Gaussians, Notes, Written};
 use pocketsplat_kernels::ops::Pinhole;
-use pocketsplat_metrics::psnr_db;
 use pocketsplat_trainer::explicit::frame;
 use pocketsplat_trainer::explicit::render::Renderer;
 use pocketsplat_trainer::export::{Refinement, bake, refine};
@@ -208,10 +207,15 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
 
     let degree = Degree::ALL[usize::from(args.sh_degree)];
     let (gaussians, n_left_out) = source.gaussians(&cameras, degree, args.iterations.unwrap_or(ITERATIONS))?;
+    if gaussians.is_empty() {
+        bail!(
+            "nothing is left of {}: its {} cameras see 0 Gaussians, needed: 1; give the folder of its photographs as CAPTURE",
+            args.bundle.display(),
+            cameras.fitted.len()
+        );
+    }
     let shown = source.pictures(&cameras.judged)?;
-    let to_bundle = |pictures: &[Image]| {
-        pictures.iter().zip(&shown).map(|(picture, shown)| psnr_db(picture, shown)).sum::<f64>() / shown.len() as f64
-    };
+    let to_bundle = |pictures: &[Image]| rounding::mean_psnr_db(pictures, &shown);
     let bundle_psnr_db = cameras.psnr_db(&shown)?;
     // Of the numbers before they are rounded for the file.
     let unrounded = source.pictures_of(&gaussians, &cameras.judged);

@@ -22,7 +22,7 @@ use level::LevelFit;
 ///
 /// Shows what a decoder draws of a bundle within so much memory: the share of the scene, its quality, the work of a frame.
 ///
-/// Quality is the manifest's, measured over test views when the bundle was made (over training views that were held out, where
+/// Quality is the manifest's, measured over at most 12 test views when the bundle was made (over training views that were held out, where
 /// --validation-every said so). Work is a bound over the views
 /// in the manifest.
 ///
@@ -34,13 +34,13 @@ use level::LevelFit;
 pub(crate) struct Args {
     /// The bundle.
     bundle: PathBuf,
-    /// Scratch memory of the decoder, as 192KiB or 65536, or several to compare [default: steps from the least that suffices]
+    /// Scratch memory of the decoder, as 192KiB or 65536, or several with commas between, to compare [default: steps from the least that suffices]
     #[arg(long, value_name = "BYTES", value_delimiter = ',')]
     ram: Vec<ByteSize>,
     /// Largest frame [default: the training size of the bundle]
     #[arg(long, value_name = "WxH")]
     resolution: Option<FrameSize>,
-    /// Draw strips with too many splats in slabs of depth, instead of leaving anchors out.
+    /// Draw strips with too many splats in slabs of depth, instead of leaving anchors out; needs --ram.
     #[arg(long, requires = "ram")]
     slabs: bool,
     /// Device level to check each tier against, at the training size: says which fit, and what is over by how much.

@@ -13,7 +13,7 @@ use pocketsplat_trainer::explicit::render::Renderer;
 use pocketsplat_trainer::explicit::up::Up;
 
 use super::capture::CaptureArgs;
-use crate::config::{CaptureOptions, Protocol};
+use crate::config::{CaptureOptions, Protocol, RunConfig};
 use crate::say::say;
 
 /// Begins each comment that is a line of the protocol.
@@ -54,6 +54,11 @@ impl GaussiansFile {
     /// Whether a file is one by its bytes, or where they say nothing by its name.
     pub(crate) fn is_one(path: &Path) -> bool {
         pocketsplat_gaussians::is_one(path)
+    }
+
+    /// Whether a run is one of `import`: of splats, and of no capture.
+    pub(crate) fn is_trained_on(config: &RunConfig) -> bool {
+        config.dataset.is_file() || Self::is_one(&config.dataset)
     }
 
     /// Reads a file, and says on stderr what was not read as it stands.
@@ -131,9 +136,21 @@ impl GaussiansFile {
 
     /// Draws for the cameras of a capture.
     pub(crate) fn renderer(&self, normalisation: &Normalisation) -> Renderer {
+        self.renderer_of_numbers(&frame::of_file(&self.notes.frame, normalisation))
+    }
+
+    /// Draws for cameras that stand among the numbers of the file, wherever these lie in the scene.
+    ///
+    /// * `normalisation`: of these numbers.
+    pub(crate) fn renderer_of_numbers(&self, normalisation: &Normalisation) -> Renderer {
         let mut gaussians = self.gaussians.clone();
-        frame::to_normalised(&mut gaussians, &frame::of_file(&self.notes.frame, normalisation));
+        frame::to_normalised(&mut gaussians, normalisation);
         Renderer::new(&gaussians).with_compensation(self.notes.compensation)
+    }
+
+    /// A camera of the scene, among the numbers of the file.
+    pub(crate) fn camera(&self, camera: &Camera) -> Camera {
+        frame::of_scene(&self.notes.frame).camera(camera)
     }
 }
 

@@ -20,8 +20,10 @@ const GROUPS: [(&str, &[&str]); 5] = [
 
 /// Commands that look at what was trained, as it was.
 const LOOKING: &[&str] = &["eval", "render", "verify", "cost", "export"];
+/// What the help of --effects says of a choice that `import` refuses.
+const AUTO_OF_EFFECTS: &str = "auto, which tests them in runs of 16,000 iterations and more, or a list";
 /// Defaults in which commands that share an option differ.
-const DEFAULTS: [(&[&str], &str, &str); 13] = [
+const DEFAULTS: [(&[&str], &str, &str); 14] = [
     (&["train"], "max_resolution", "by the preset"),
     (LOOKING, "max_resolution", "the training size of the bundle"),
     (&["train"], "background", "black; white for 3dgs on a Blender capture"),
@@ -33,6 +35,7 @@ const DEFAULTS: [(&[&str], &str, &str); 13] = [
     (&["import"], "iterations", "5000"),
     (&["train"], "effects", "auto"),
     (&["train"], "feature_dim", "32; by the limits for a device; with --from that of its run"),
+    (&["import"], "feature_dim", "32; by the limits for a device"),
     (&["import"], "effects", "view-colour,view-geometry,anisotropy"),
     (&["train", "import"], "modules", "rdo-pruning, with tiered-pruning for a device"),
 ];
@@ -52,6 +55,8 @@ pub(super) fn own_options(mut command: Command) -> Command {
     command = command.mut_subcommand("survey", |command| with(command, "background", drawn));
     command.mut_subcommand("import", |command| {
         let command = with(command, "backbone", |arg| arg.value_parser(backbone_of_anchors()));
+        let command =
+            with(command, "effects", |arg| with_help(arg, |help| help.replacen(AUTO_OF_EFFECTS, "a list", 1)));
         with(command, "background", drawn)
     })
 }
@@ -64,9 +69,13 @@ fn with(command: Command, id: &str, change: impl FnOnce(Arg) -> Arg) -> Command 
 
 /// The option with another default in its help.
 fn with_default(arg: Arg, default: &str) -> Arg {
+    with_help(arg, |help| format!("{} [default: {default}]", help.split(" [default:").next().unwrap_or_default()))
+}
+
+/// The option with its help changed.
+fn with_help(arg: Arg, change: impl FnOnce(&str) -> String) -> Arg {
     let help = arg.get_long_help().or(arg.get_help()).map(StyledStr::to_string).unwrap_or_default();
-    let said = help.split(" [default:").next().unwrap_or_default().to_owned();
-    let text = format!("{said} [default: {default}]");
+    let text = change(&help);
     arg.help(text.clone()).long_help(text)
 }
 
@@ -113,6 +122,9 @@ mod tests {
                 );
                 let offers = |value: &str| arg.get_possible_values().iter().any(|other| other.get_name() == value);
                 assert!(!offers("3dgs") || command.get_name() == "train", "{}", command.get_name());
+                let speaks_of_auto =
+                    command.get_name() == "import" && arg.get_id() == "effects" && help.contains("auto");
+                assert!(!speaks_of_auto, "{help}");
                 assert!(!offers("learned") || !["import", "survey"].contains(&command.get_name()));
             }
         }

@@ -11,6 +11,7 @@ use pocketsplat_capture::dataset::{Background, Capture, FrameSize};
 use pocketsplat_core::Budget;
 use pocketsplat_files::shell_word;
 use pocketsplat_trainer::explicit::bulk::Bulk;
+use pocketsplat_trainer::explicit::frame;
 use pocketsplat_trainer::explicit::pictures::{Pictures, capture};
 use pocketsplat_trainer::train::config::ExposureChoice;
 use pocketsplat_trainer::train::run::RunFolder;
@@ -36,6 +37,8 @@ const LONGEST_PX: u32 = 200;
 
 /// One camera in so many is held out.
 const HELD_OUT_EVERY: usize = 8;
+/// Pictures wait in memory, and training takes some of its own.
+const MOST_PICTURE_BYTES: u64 = 4_000_000_000;
 
 /// Centres that training starts from, at most.
 const N_POINTS: usize = 20_000;
@@ -88,7 +91,7 @@ pub(crate) struct Args {
     loss: LossArgs,
     #[command(flatten)]
     quality: QualityOptions,
-    /// Rate weight: a larger one makes smaller files [default: 0.0005; chosen by --bytes or --flash]
+    /// Rate weight: a larger one makes smaller files [default: 0.0005; by the limits for a device]
     #[arg(long, value_name = "X", help_heading = QUALITY)]
     lambda: Option<f64>,
     #[command(flatten)]
@@ -208,7 +211,8 @@ fn seen(args: &Args, size: Option<FrameSize>, file: &GaussiansFile) -> Result<Se
     let (bulk, all) = match &args.cameras {
         Some(path) => {
             args.stand.refuse("--cameras has some")?;
-            (bulk_of(&args.points, file)?, cameras::of_file(path, size, LONGEST_PX)?)
+            let of_scene = cameras::of_file(path, size, LONGEST_PX)?;
+            (bulk_of(&args.points, file)?, of_scene.iter().map(|camera| file.camera(camera)).collect())
         }
         None => {
             let size_px = size.map_or([LONGEST_PX; 2], |frame| [frame.width_px, frame.height_px]);
@@ -222,6 +226,15 @@ fn seen(args: &Args, size: Option<FrameSize>, file: &GaussiansFile) -> Result<Se
     if largest > u32::from(most_px) {
         bail!(
             "pictures of {largest} px are wider or higher than the {most_px} px that the decoder draws; use --resolution"
+        );
+    }
+    let n_bytes: u64 = all.iter().map(|camera| 3 * u64::from(camera.width_px) * u64::from(camera.height_px)).sum();
+    if n_bytes > MOST_PICTURE_BYTES {
+        bail!(
+            "{} pictures take {:.1} GB of memory, needed: at most {:.1}; ask for a smaller --resolution or fewer cameras",
+            all.len(),
+            n_bytes as f64 / 1e9,
+            MOST_PICTURE_BYTES as f64 / 1e9
         );
     }
     let (mut train, mut test) = (Vec::new(), Vec::new());
@@ -240,7 +253,39 @@ fn captured(args: &Args, file: &GaussiansFile, bulk: &Bulk, cameras: [&[Camera];
     let how = Pictures { compensation: file.compensation(), background, n_points: N_POINTS, seed: args.seed };
     let centre = args.cameras.is_none().then_some(bulk.centre);
     let capture = capture(&file.gaussians, bulk, centre, cameras, &how);
-    capture.with_context(|| "all cameras stand in one point; give --cameras that stand apart".to_owned())
+    let mut capture = capture.context("all cameras stand in one point; give --cameras that stand apart")?;
+    capture.normalisation = frame::of_scene_through_file(&file.notes.frame, &capture.normalisation);
+    warn_of_the_blind(args, bulk, &capture)?;
+    Ok(capture)
+}
+
+/// Says how many cameras see no Gaussian.
+///
+/// # Errors
+/// None sees one: cameras of another frame, or with other axes.
+fn warn_of_the_blind(args: &Args, bulk: &Bulk, capture: &Capture) -> Result<()> {
+    let background = args.background.rgb8();
+    let mut n_seeing = 0;
+    for view in &capture.train {
+        n_seeing += usize::from(view.photograph()?.image.rgb.chunks_exact(3).any(|rgb| *rgb != background));
+    }
+    let n = capture.train.len();
+    let [x, y, z] = bulk.centre.to_array();
+    let whose = args.cameras.as_deref().map(|path| format!(" of {}", path.display())).unwrap_or_default();
+    let what = format!(
+        "of {n} cameras{whose} {n_seeing} see a Gaussian of {}, whose bulk has its middle at ({x:.4}, {y:.4}, {z:.4}) and a radius of {:.4}",
+        args.points.display(),
+        bulk.radius
+    );
+    if n_seeing == 0 {
+        bail!(
+            "{what}; needed: cameras in the frame of the splats, that look at them, in front of a --background of another colour"
+        );
+    }
+    if n_seeing < n {
+        say!("warning: {what}");
+    }
+    Ok(())
 }
 
 fn result(file: &GaussiansFile, bulk: &Bulk, capture: &Capture, trained: TrainResult) -> Result<ImportResult> {

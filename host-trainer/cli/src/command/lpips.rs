@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context as _, Result};
 use pocketsplat_metrics::{InputRange, Lpips};
 
+use crate::config::absolute;
 use crate::config::named::{LPIPS_RANGES, one_of};
 
 /// How to come by weights.
@@ -26,7 +27,7 @@ impl LpipsArgs {
     /// The options by which another command is given the same, from any folder.
     pub(crate) fn options(&self) -> Result<Vec<String>> {
         let Some(path) = &self.lpips_weights else { return Ok(Vec::new()) };
-        let path = std::path::absolute(path).with_context(|| format!("{} is no path", path.display()))?;
+        let path = absolute(path)?;
         let range = match self.lpips_range {
             InputRange::ZeroToOne => LPIPS_RANGES[0],
             InputRange::MinusOneToOne => LPIPS_RANGES[1],

@@ -16,7 +16,8 @@ use super::outputs::{BUNDLE, OverwriteArgs};
 use super::tables::published::PublishedRow;
 use super::workflow::{Place, Planner};
 use super::{output, point, stop, tables, train, train_args};
-use crate::config::RunConfig;
+use crate::config::{RunConfig, absolute};
+use crate::program;
 use crate::say::say;
 use spec::{AskedRun, Spec};
 
@@ -46,7 +47,11 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     let spec = Spec::read(&args.spec)?;
-    let folder = std::path::absolute(&args.output).with_context(|| format!("{} is no path", args.output.display()))?;
+    let folder = absolute(&args.output)?;
+    // What the workflow names besides: where it is called, and this program.
+    for path in std::iter::once(PathBuf::from(".")).chain(program::path()) {
+        absolute(&path)?;
+    }
     let lpips = args.lpips.options()?;
     if let Some(published) = &spec.published {
         PublishedRow::read_all(published)?;

@@ -6,9 +6,10 @@ mod pictures;
 mod poses;
 mod sections;
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use pocketsplat_capture::dataset::{Capture, Split};
 use pocketsplat_files::{Output, Outputs, shell_word};
 use pocketsplat_viewer::{escaped, page};
@@ -17,6 +18,7 @@ use serde::Deserialize;
 use super::bundle::BundleFile;
 use super::capture::CaptureArgs;
 use super::eval::{Evaluation, Measurements, Renderer, measure};
+use super::gaussians::GaussiansFile;
 use super::output;
 use super::outputs::{self, OverwriteArgs, check_name, reading_capture};
 use super::train::result::{PoseChange, ViewExposure};
@@ -89,12 +91,14 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     };
     outputs = reading_capture(outputs, &source, &output);
     let output = outputs.file(&output, outputs::PAGE)?;
-    let capture = source.load(config.train.seed);
-    let capture = capture
-        .inspect_err(|error| {
+    let has_photographs = args.dataset.is_some() || !GaussiansFile::is_trained_on(&config);
+    let capture = has_photographs.then(|| source.load(config.train.seed));
+    let capture = capture.and_then(|capture| {
+        let warn = |error: &anyhow::Error| {
             say!("warning: the page will lack photographs: {error:#}; give the folder as CAPTURE if it has moved");
-        })
-        .ok();
+        };
+        capture.inspect_err(warn).ok()
+    });
     let n_bytes = write(&args.run, &config, (capture.as_ref(), args.dataset.as_deref()), &output)?;
     output::print_text(&format!("{}: {:.2} MB; open it in a browser\n", output.path().display(), n_bytes as f64 / 1e6))
 }
@@ -122,12 +126,16 @@ fn write(
     output: &Output,
 ) -> Result<usize> {
     let result = folder.join("result.json");
-    let text = std::fs::read_to_string(&result).with_context(|| {
-        format!(
-            "{} is missing: the run is not finished; go on with `pocketsplat train --resume {}`",
-            result.display(),
-            shell_word(folder)
-        )
+    let text = std::fs::read_to_string(&result).map_err(|error| match error.kind() {
+        ErrorKind::NotFound => {
+            let how = if GaussiansFile::is_trained_on(config) {
+                "give the command of `pocketsplat import` again, and it goes on".to_owned()
+            } else {
+                format!("go on with `pocketsplat train --resume {}`", shell_word(folder))
+            };
+            anyhow!("{} is missing: the run is not finished; {how}", result.display())
+        }
+        _ => anyhow::Error::from(error).context(format!("could not read {}", result.display())),
     })?;
     let result = serde_json::from_str(&text).with_context(|| format!("{} is no result of a run", result.display()))?;
     let file = BundleFile::of_run(folder, config)?;

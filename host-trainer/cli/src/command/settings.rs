@@ -42,12 +42,14 @@ pub(crate) struct QualityOptions {
         "Feature width of an anchor, and hidden width of the heads", TrainConfig::default().shape.feature_dim))]
     feature_dim: Option<usize>,
     #[arg(long, value_name = "K", help_heading = QUALITY, hide_short_help = true,
-        help = with_default("Gaussians of an anchor", TrainConfig::default().shape.n_offsets))]
+        help = with_default("Gaussians of an anchor",
+        format_args!("{}; by the limits for a device", TrainConfig::default().shape.n_offsets)))]
     offsets: Option<usize>,
     /// Edge of a lattice cell in normalised units, of which the cameras span about 5 [default: from the points' spacing]
     #[arg(long, value_name = "E", help_heading = QUALITY, hide_short_help = true)]
     voxel_size: Option<f64>,
-    /// Grow to at most N anchors, those with the largest gradients first [default: no limit]
+    /// Grow to at most N anchors, those with the largest gradients first [default: no limit; by the limits
+    /// for a device]
     #[arg(long, value_name = "N", help_heading = QUALITY, hide_short_help = true)]
     max_anchors: Option<usize>,
     /// Keep N anchors: those that contribute most to the training views when growth ends, half-way, or with rdo-pruning those

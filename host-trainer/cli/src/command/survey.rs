@@ -20,7 +20,7 @@ use super::lpips::LpipsArgs;
 use super::outputs::{FIGURE, OverwriteArgs, table as table_file};
 use super::tables::published::PublishedRow;
 use super::{output, stop, train};
-use crate::config::{ExplicitRunConfig, Preset, absolute};
+use crate::config::{ExplicitRunConfig, Preset, absolute, check_random_points};
 use crate::say::say;
 use families::ANCHORS;
 use point::Point;
@@ -103,6 +103,7 @@ fn configured(args: &Args, folder: &Path) -> Result<ExplicitRunConfig> {
     if options.test_every == Some(0) {
         bail!("--test-every 0 holds out no view, and methods are compared on such views; leave it out");
     }
+    check_random_points(args.random_points, "--random-points")?;
     let output = folder.join("3dgs.ply");
     let mut config = ExplicitRunConfig::of_preset(Preset::Quick, absolute(dataset)?, output);
     config.capture = options.or(&config.capture);

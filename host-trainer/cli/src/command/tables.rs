@@ -22,6 +22,9 @@ use published::PublishedRow;
 pub(super) const FILES: [(&str, Content); 2] =
     [("tables/runs.csv", table(&["run,"])), ("tables/bd_rate.csv", table(&["dataset,"]))];
 
+/// What files in `tables` are called that are of no dataset, without their endings.
+pub(super) const OWN_NAMES: [&str; 3] = ["runs", "bd_rate", "comparison"];
+
 /// Tabulate the finished runs of a plan.
 ///
 /// The plan may be unfinished.

@@ -72,7 +72,7 @@ fn resume(args: &Args, path: &Path) -> Result<ExitCode> {
     }
     let begun = RunConfig::parse(&folder.config()?);
     let begun = begun.with_context(|| format!("could not use the config.toml in {}", path.display()))?;
-    if begun.dataset.is_file() || GaussiansFile::is_one(&begun.dataset) {
+    if GaussiansFile::is_trained_on(&begun) {
         bail!("the run in {} is of `pocketsplat import`; give that command again, and it goes on", path.display());
     }
     let mut config = args.applied_to(begun.clone())?;
@@ -247,7 +247,7 @@ fn train_watched<'a>(
         return Ok(Ended::Interrupted);
     }
     let path = folder.path().to_owned();
-    let attempt = Attempt { device, stop: &stop, goes_on: GoesOn::Resume };
+    let attempt = Attempt { device, stop: &stop, goes_on: GoesOn::Resume(args.device_choice()) };
     let Some(result) = train_in(folder, &config, capture, start, attempt, output)? else {
         return Ok(Ended::Interrupted);
     };

@@ -57,7 +57,7 @@ pub(crate) struct Args {
     preset: Option<Preset>,
     #[command(flatten)]
     quality: QualityOptions,
-    /// Rate weight: a larger one makes smaller files [default: 0.002 times the share of opaque pixels; chosen by --bytes or --flash]
+    /// Rate weight: a larger one makes smaller files [default: 0.002 times the share of opaque pixels; by the limits for a device]
     #[arg(long, value_name = "X", help_heading = QUALITY)]
     lambda: Option<f64>,
     /// Move the training cameras to where their photographs fit the scene best, for poses that are slightly off.
@@ -65,8 +65,8 @@ pub(crate) struct Args {
     refine: bool,
     #[command(flatten)]
     device: DeviceArgs,
-    /// Configuration to read, as a run folder has it; what it does not say is as without it, but that nothing is chosen for a device, and
-    /// options override it.
+    /// Configuration to read, as config.toml of a run; keys that it lacks have their defaults, options override it, and a device's limits
+    /// choose nothing.
     #[arg(long, value_name = "FILE.toml", conflicts_with = "resume", help_heading = RUN, hide_short_help = true)]
     config: Option<PathBuf>,
     /// Print the configuration that the run would have, with every key, and the estimate; train nothing and write nothing.

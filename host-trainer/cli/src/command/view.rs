@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
-use pocketsplat_files::{Output, Outputs, shell_word};
+use pocketsplat_files::{Output, Outputs, shell_word, unused};
 use pocketsplat_format::Bundle;
 use pocketsplat_viewer::{SceneFile, package, page};
 
@@ -65,16 +65,16 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 
 /// Writes the page of one file of splats.
 fn run_splats(args: &Args, splats: &Path) -> Result<()> {
-    let word = shell_word(splats);
+    let (word, bundle) = (shell_word(splats), shell_word(&unused(Path::new("scene.psb"))));
     let Some(page) = &args.output else {
         bail!(
-            "a package draws bundles, and {} holds splats; make a bundle with `pocketsplat import {word} -o scene.psb`",
+            "a package draws bundles, and {} holds splats; make a bundle with `pocketsplat import {word} -o {bundle}`",
             splats.display()
         );
     };
     if args.package.is_some() || args.bundles.len() > 1 {
         bail!(
-            "a page shows bundles, or one file of splats alone; make a bundle of {} with `pocketsplat import {word} -o scene.psb`, or look \
+            "a page shows bundles, or one file of splats alone; make a bundle of {} with `pocketsplat import {word} -o {bundle}`, or look \
              at it with `pocketsplat view {word} -o {}`",
             splats.display(),
             shell_word(page)

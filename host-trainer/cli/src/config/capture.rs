@@ -1,10 +1,12 @@
 //! How photographs are prepared: options of every command that reads a capture, and a section of a run's configuration.
 
-use pocketsplat_capture::dataset::{Background, FrameSize, PointsChoice, SceneKind};
+use anyhow::{Result, bail};
+use pocketsplat_capture::dataset::{Background, FrameSize, MOST_RANDOM_POINTS, PointsChoice, SceneKind};
 use serde::{Deserialize, Serialize};
 
 use super::heading::INPUT;
 use super::named::{BACKGROUNDS, POINTS, SCENES, one_of};
+use crate::plot::thousands;
 
 /// How photographs are prepared.
 #[derive(clap::Args, Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -50,7 +52,25 @@ pub(crate) struct CaptureOptions {
     pub(crate) test_every: Option<u32>,
 }
 
+/// Refuses a number of random points from which nothing can be trained.
+///
+/// * `said_by`: the option or key that says it.
+pub(crate) fn check_random_points(n: usize, said_by: &str) -> Result<()> {
+    if !(1..=MOST_RANDOM_POINTS).contains(&n) {
+        let most = thousands(MOST_RANDOM_POINTS as f64);
+        bail!("{said_by} asks for {n} random points, needed: 1 to {most}; give another number, or leave it out");
+    }
+    Ok(())
+}
+
 impl CaptureOptions {
+    /// Refuses what no run can begin with.
+    ///
+    /// Not for captures that are only looked at: those are loaded without points.
+    pub(crate) fn check(&self) -> Result<()> {
+        self.n_random_points.map_or(Ok(()), |n| check_random_points(n, "`capture.n_random_points`"))
+    }
+
     /// What is chosen here, and what `other` chooses where nothing is.
     pub(crate) fn or(&self, other: &Self) -> Self {
         // One way to say the size replaces the other.

@@ -6,10 +6,10 @@ use anyhow::{Result, bail};
 use pocketsplat_capture::dataset::{Background, Layout, PointsChoice, layout_of};
 use pocketsplat_trainer::explicit::CloudConfig;
 use serde::{Deserialize, Serialize};
-use toml::Table;
+use toml::{Table, Value};
 
 use super::named::EXPLICIT;
-use super::{CaptureOptions, Preset, keys_of, merge, refuse_unknown, table_of};
+use super::{CaptureOptions, Preset, check_is_text, keys_of, merge, refuse_unknown, table_of};
 
 /// Random points that training starts from on captures of Blender, as published.
 const PUBLISHED_POINTS: usize = 100_000;
@@ -49,7 +49,7 @@ impl ExplicitRunConfig {
 
     /// Whether a configuration is one of these.
     pub(crate) fn is_one(text: &str) -> bool {
-        text.parse::<Table>().is_ok_and(|table| table.get("backbone").is_some())
+        text.parse::<Table>().is_ok_and(|table| table.get("backbone").and_then(Value::as_str) == Some(EXPLICIT))
     }
 
     /// Reads what [`Self::to_toml`] wrote.
@@ -69,10 +69,14 @@ impl ExplicitRunConfig {
 
     /// The same with some keys set, each given as `table.key=value`.
     pub(crate) fn with_keys(&self, keys: &[String]) -> Result<Self> {
+        // Before tables name them: those would say only that some path is no text.
+        check_is_text(&self.dataset)?;
+        check_is_text(&self.output)?;
         let (mut all, given) = (table_of(self)?, keys_of(keys)?);
         merge(&mut all, &given);
         let config: Self = all.try_into()?;
         refuse_unknown(&given, &table_of(&config)?, "")?;
+        config.capture.check()?;
         Ok(config)
     }
 
@@ -123,6 +127,21 @@ mod tests {
     }
 
     #[test]
+    fn a_backbone_in_the_wrong_place_makes_no_configuration_explicit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.toml");
+        for (text, said) in [
+            ("backbone = \"hac\"", "unknown key `backbone`; known here: "),
+            ("backbone = 3", "unknown key `backbone`; known here: "),
+            ("backbone = \"3dgs\"", "is of a run of --backbone 3dgs"),
+        ] {
+            std::fs::write(&path, text).unwrap();
+            let error = format!("{:#}", crate::config::RunConfig::read(&path).unwrap_err());
+            assert!(error.contains("run.toml") && error.contains(said), "{text}: {error}");
+        }
+    }
+
+    #[test]
     fn captures_of_blender_are_trained_as_published_unless_someone_says_otherwise() {
         let options = Preset::Standard.config().capture;
         for layout in [None, Some(Layout::Colmap), Some(Layout::Nerfstudio)] {
@@ -150,5 +169,7 @@ mod tests {
         let elsewhere = ExplicitRunConfig { dataset: "moved".into(), ..config() };
         assert_eq!(config().difference(&elsewhere, places).unwrap(), None);
         assert!(config().with_keys(&["gaussians.density.intervall=50".to_owned()]).is_err());
+        let error = config().with_keys(&["capture.n_random_points=0".to_owned()]).unwrap_err().to_string();
+        assert!(error.contains("0 random points, needed: 1 to 10,000,000"), "{error}");
     }
 }

@@ -13,6 +13,7 @@ pub(crate) mod target;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use pocketsplat_files::shown;
 use pocketsplat_trainer::encode::Encoding;
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
@@ -21,7 +22,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
-pub(crate) use capture::CaptureOptions;
+pub(crate) use capture::{CaptureOptions, check_random_points};
 pub(crate) use effects::EffectsConfig;
 pub(crate) use explicit::ExplicitRunConfig;
 pub(crate) use named::EXPLICIT;
@@ -63,9 +64,22 @@ impl Default for RunConfig {
 /// A path as a run keeps it, so that it can go on from any folder.
 ///
 /// # Errors
-/// The path is empty.
+/// The path is empty, or not UTF-8.
 pub(crate) fn absolute(path: &Path) -> Result<PathBuf> {
-    std::path::absolute(path).with_context(|| format!("`{}` is no path", path.display()))
+    let absolute = std::path::absolute(path).with_context(|| format!("`{}` is no path", path.display()))?;
+    check_is_text(&absolute)?;
+    Ok(absolute)
+}
+
+/// Refuses a path that is not UTF-8: configurations, plans and their command lines are text, and would name another file or none.
+fn check_is_text(path: &Path) -> Result<()> {
+    if path.to_str().is_none() {
+        bail!(
+            "`{}` is not UTF-8, and a configuration names files in UTF-8; rename it, or link to it by another name",
+            shown(path)
+        );
+    }
+    Ok(())
 }
 
 /// A configuration as tables of TOML.
@@ -168,6 +182,7 @@ impl RunConfig {
 
     /// Refuses what no run can use, before any work starts.
     pub(crate) fn check(&self) -> Result<()> {
+        self.capture.check()?;
         self.train.validate()?;
         let n = self.train.iterations;
         if let Some(beyond) = self.fork_at.iter().find(|iteration| **iteration > n) {

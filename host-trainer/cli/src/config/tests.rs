@@ -133,6 +133,38 @@ fn only_what_decides_the_result_counts_as_a_difference() {
 }
 
 #[test]
+fn a_run_starts_from_one_random_point_at_least() {
+    let config = |n: usize| {
+        let capture = CaptureOptions { n_random_points: Some(n), ..RunConfig::default().capture };
+        RunConfig { capture, ..RunConfig::default() }
+    };
+    for n in [1, 10_000_000] {
+        config(n).check().unwrap();
+    }
+    for n in [0, 10_000_001] {
+        let error = config(n).check().unwrap_err().to_string();
+        let said = format!("`capture.n_random_points` asks for {n} random points, needed: 1 to 10,000,000; ");
+        assert!(error.contains(&said), "{error}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_path_that_is_no_text_is_refused_as_it_is_shown() {
+    use std::os::unix::ffi::OsStrExt as _;
+    let odd = Path::new(std::ffi::OsStr::from_bytes(b"/captures/caf\xe9"));
+    let said = |error: anyhow::Error| {
+        let error = error.to_string();
+        assert!(error.starts_with("`/captures/caf\\xe9` is not UTF-8"), "{error}");
+        assert!(error.ends_with("rename it, or link to it by another name"), "{error}");
+    };
+    said(absolute(odd).unwrap_err());
+    let explicit = ExplicitRunConfig::of_preset(Preset::Quick, odd.to_owned(), "a.ply".into());
+    said(explicit.with_keys(&["gaussians.density.interval=50".to_owned()]).unwrap_err());
+    assert_eq!(absolute(Path::new("/captures/café")).unwrap(), Path::new("/captures/café"));
+}
+
+#[test]
 fn checkpoints_to_fork_from_lie_inside_the_run() {
     let config = |fork_at: u32| RunConfig { fork_at: vec![fork_at], ..RunConfig::default() };
     let n = RunConfig::default().train.iterations;

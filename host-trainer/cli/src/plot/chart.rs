@@ -1,6 +1,6 @@
 //! What all charts share: sizes, axes, legend, names of points.
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use plotters::chart::ChartContext;
 use plotters::coord::ranged1d::{AsRangedCoord, Ranged, ValueFormatter};
 use plotters::coord::types::RangedCoordf64;
@@ -65,6 +65,24 @@ pub(super) fn with_legend<'a>(panel: &Area<'a>) -> (Area<'a>, Area<'a>) {
     panel.split_horizontally(WIDTH_PX - LEGEND_PX)
 }
 
+/// The ends of an axis lie apart by more than this share of the larger one: closer ones have no marks between them that can be told apart.
+const LEAST_SHARE: f64 = 1e-9;
+
+/// Refuses an axis on which no marks can be set: what sets them would never come to its end.
+fn check_axis(name: &str, range: &std::ops::Range<f64>) -> Result<()> {
+    let (width, largest) = ((range.end - range.start).abs(), range.start.abs().max(range.end.abs()));
+    // The last is for logarithmic axes: the marks of one that begins and ends at 0 stay there, whatever they are multiplied by.
+    if width.is_finite() && width > LEAST_SHARE * largest && width >= f64::MIN_POSITIVE {
+        return Ok(());
+    }
+    bail!(
+        "the axis `{name}` would reach from {:?} to {:?}, needed: finite ends that lie apart by more than a billionth of the larger; \
+         correct the numbers that are drawn",
+        range.start,
+        range.end
+    )
+}
+
 /// A chart with axes, ready for its curves.
 pub(super) fn axes<'a, 'b, X>(
     area: &'a Area<'b>,
@@ -73,9 +91,12 @@ pub(super) fn axes<'a, 'b, X>(
     labels: &Labels<'_>,
 ) -> Result<Chart<'a, 'b, X::CoordDescType>>
 where
-    X: AsRangedCoord<Value = f64>,
+    X: AsRangedCoord<Value = f64> + Clone,
     X::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
 {
+    let along_x: X::CoordDescType = x.clone().into();
+    check_axis(labels.x, &along_x.range())?;
+    check_axis(labels.y, &y)?;
     let mut chart = ChartBuilder::on(area)
         .caption(labels.title, (FONT, TITLE_PX).into_font().color(&INK))
         .margin(12)
@@ -158,10 +179,12 @@ pub(super) fn name_points<'a, 'b: 'a, X: Ranged<ValueType = f64>>(
     Ok(())
 }
 
-/// The smallest range with all `values`, widened by a twentieth at both ends; around a single value by 1.
+/// The smallest range with all `values`, widened by a twentieth at both ends; around a single value, or several that are almost one, by 1
+/// or a thousandth of it.
 pub(super) fn padded(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
-    let pad = if high > low { 0.05 * (high - low) } else { 1.0 };
+    let largest = low.abs().max(high.abs());
+    let pad = if high - low > LEAST_SHARE * largest { 0.05 * (high - low) } else { f64::max(1.0, 1e-3 * largest) };
     if low.is_finite() && high.is_finite() { low - pad..high + pad } else { 0.0..1.0 }
 }
 
@@ -207,10 +230,25 @@ mod tests {
     }
 
     #[test]
+    fn an_axis_that_no_marks_fit_is_refused_by_its_name() {
+        let without_end = [0.0..f64::INFINITY, f64::NEG_INFINITY..0.0, f64::NAN..1.0, -1e308..1e308];
+        for range in without_end.into_iter().chain([5.0..5.0, 1.0..1.0 + 1e-12, 0.0..1e-310]) {
+            let said = check_axis("PSNR, dB", &range).unwrap_err().to_string();
+            assert!(said.contains("`PSNR, dB`") && said.contains("needed: finite ends"), "{range:?}: {said}");
+        }
+        for range in [0.0..1.0, 30.0..30.1, 1e300..2e300, 2.0..-1.0, padded([30.0, 30.0 + 4e-15].into_iter())] {
+            check_axis("size", &range).unwrap();
+        }
+    }
+
+    #[test]
     fn a_range_is_never_empty() {
         assert_eq!(padded([1.0, 3.0].into_iter()), 0.9..3.1);
         assert_eq!(padded([2.0].into_iter()), 1.0..3.0);
         assert_eq!(padded(std::iter::empty()), 0.0..1.0);
+        assert_eq!(padded([2.0, 2.0 + 1e-15].into_iter()), 1.0..3.0 + 1e-15, "values that are almost one");
+        let huge = padded([1e300].into_iter());
+        assert!(huge.start < 1e300 && huge.end > 1e300, "where 1 is nothing: {huge:?}");
         assert_eq!((from_zero([2.0].into_iter()), from_zero(std::iter::empty())), (0.0..2.1, 0.0..1.0));
     }
 }

@@ -75,7 +75,7 @@ fn shown(points: &[CostPoint]) -> std::ops::Range<f64> {
 
 fn draw<X>(panel_area: &Area<'_>, figure: &Area<'_>, panel: &CostPanel, parameters: &[&str], costs: X) -> Result<()>
 where
-    X: AsRangedCoord<Value = f64>,
+    X: AsRangedCoord<Value = f64> + Clone,
     X::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
 {
     let points = &panel.points;
@@ -152,5 +152,26 @@ mod tests {
         let svg = cost_svg(&[outlying]).unwrap();
         assert!(svg.contains("lies below") && !svg.contains(">15<"), "the front keeps its room");
         assert!(cost_svg(&[CostPanel { points: Vec::new(), ..panel("a", "b") }]).is_ok(), "an empty panel is one");
+    }
+
+    #[test]
+    fn a_cost_without_end_is_refused_on_either_axis() {
+        let point = |cost, psnr_db| CostPoint {
+            parameter: "level".to_owned(),
+            setting: "exact".to_owned(),
+            cost,
+            psnr_db,
+            on_front: true,
+        };
+        // Of these, the first is drawn logarithmically.
+        for points in [
+            vec![point(1.0, 30.0), point(f64::INFINITY, 31.0)],
+            vec![point(f64::INFINITY, 30.0)],
+            vec![point(-1e308, -1e308), point(1.0, 1e308)],
+        ] {
+            let (title, unit) = ("host".to_owned(), "milliseconds".to_owned());
+            let said = cost_svg(&[CostPanel { title, unit, points }]).unwrap_err().to_string();
+            assert!(said.contains("the axis `"), "{said}");
+        }
     }
 }

@@ -1,8 +1,10 @@
 //! Plots of what runs recorded, as SVG that any browser shows.
 //!
-//! [`Recording`] reads a CSV file and tells by its header what it holds; `learning` and `rate_distortion` draw several of
-//! a kind into one figure, `cost` compares settings; `exposures` is of one run; `chart`, `marker` and `labels` are what all share. No fonts are needed to draw: text stays text.
+//! [`Recording`] reads a CSV file and tells by its header what it holds; `cells` refuses numbers that no figure can show. `learning` and
+//! `rate_distortion` draw several of a kind into one figure, `cost` compares settings; `exposures` is of one run; `chart`, `marker` and
+//! `labels` are what all share. No fonts are needed to draw: text stays text.
 
+mod cells;
 mod chart;
 mod cost;
 mod exposures;
@@ -14,6 +16,7 @@ mod rate_distortion;
 mod recording;
 mod results;
 
+pub(crate) use cells::{refuse_infinite, refused};
 pub(crate) use chart::thousands;
 pub(crate) use cost::{CostPanel, CostPoint, cost_svg};
 pub(crate) use exposures::exposures_svg;

@@ -27,7 +27,7 @@ pub(crate) fn rate_distortion_svg(curves: &[Named<Vec<ResultRow>>], axis: SizeAx
         SizeAxis::Linear => draw(curves, 0.0..1.1 * most.max(1e-6)),
         // Powers of two, so that there are marks between 1 MB and 10.
         SizeAxis::Logarithmic => {
-            let (from, to) = if most > 0.0 { (least.max(1e-6) / 1.25, 1.25 * most) } else { (0.5, 2.0) };
+            let (from, to) = if most > 0.0 { (least.max(1e-6) / 1.25, 1.25 * most.max(1e-6)) } else { (0.5, 2.0) };
             draw(curves, (from..to).log_scale().base(2.0))
         }
     }
@@ -35,7 +35,7 @@ pub(crate) fn rate_distortion_svg(curves: &[Named<Vec<ResultRow>>], axis: SizeAx
 
 fn draw<X>(curves: &[Named<Vec<ResultRow>>], sizes: X) -> Result<String>
 where
-    X: AsRangedCoord<Value = f64>,
+    X: AsRangedCoord<Value = f64> + Clone,
     X::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
 {
     chart::figure(1, |panels, figure| {
@@ -134,6 +134,18 @@ mod tests {
     #[test]
     fn idle_zeros_are_left_out() {
         assert_eq!([0.5, 0.125, 10.0, 0.0].map(significant), ["0.5", "0.125", "10", "0"]);
+    }
+
+    #[test]
+    fn a_size_without_end_is_refused_on_either_axis() {
+        let curve = |size_bytes| Named { name: "ours".to_owned(), what: vec![ResultRow::of("rate", size_bytes, 30.0)] };
+        for axis in [SizeAxis::Linear, SizeAxis::Logarithmic] {
+            for curves in [vec![curve(f64::INFINITY)], vec![curve(1e6), curve(f64::INFINITY)]] {
+                let said = rate_distortion_svg(&curves, axis).unwrap_err().to_string();
+                assert!(said.contains("the axis `size, MB"), "{axis:?}: {said}");
+            }
+            assert!(rate_distortion_svg(&[curve(0.5)], axis).is_ok(), "less than a byte");
+        }
     }
 
     #[test]

@@ -7,9 +7,9 @@ use pocketsplat_trainer::cost::on_front;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-use super::Named;
 use super::cost::{CostPanel, CostPoint};
 use super::results::{self, ResultRow};
+use super::{Named, refuse_infinite};
 
 /// One row of a run's `progress.csv`; other columns are passed over.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
@@ -35,6 +35,9 @@ pub(crate) struct LearningRow {
 }
 
 impl LearningRow {
+    /// Its columns that have to be finite.
+    const NUMBERS: [&str; 5] = ["psnr_db", "seconds", "feature_bits", "log_scale_bits", "offset_bits"];
+
     /// Mean bits of an anchor's values, where the run has a rate.
     pub(crate) fn bits(&self) -> Option<f64> {
         Some(self.feature_bits? + self.log_scale_bits? + self.offset_bits?)
@@ -50,6 +53,11 @@ struct RunRow {
     psnr_db: f64,
     #[serde(rename = "Size [Bytes]")]
     size_bytes: f64,
+}
+
+impl RunRow {
+    /// Its columns that have to be finite.
+    const NUMBERS: [&str; 3] = ["processor_minutes", "PSNR", "Size [Bytes]"];
 }
 
 /// A CSV file by what it holds.
@@ -75,11 +83,11 @@ impl Recording {
         let header = reader.headers()?.clone();
         let has = |names: &[&str]| names.iter().all(|name| header.iter().any(|column| column == *name));
         if has(&["iteration", "psnr_db", "anchors"]) {
-            Ok(Self::Learning(rows(reader)?))
+            Ok(Self::Learning(rows(reader, &LearningRow::NUMBERS)?))
         } else if has(&["knob", "setting", "PSNR", "host_s"]) {
             Ok(Self::Cost(settings(reader)?))
         } else if has(&["setting", "processor_minutes", "PSNR", "Size [Bytes]"]) {
-            Ok(Self::Cost(runs(&rows(reader)?)))
+            Ok(Self::Cost(runs(&rows(reader, &RunRow::NUMBERS)?)))
         } else if results::is_table(&header) {
             Ok(Self::Curves(results::curves(&mut reader)?))
         } else {
@@ -113,6 +121,7 @@ fn settings(mut reader: csv::Reader<&[u8]>) -> Result<Vec<CostPanel>> {
         let front = place(&format!("{machine} on_front"))?;
         let mut points = Vec::new();
         for record in records.iter().filter(|record| !record[column].is_empty()) {
+            refuse_infinite(&header, record, &[&header[column], &header[psnr]])?;
             let number = |i: usize| record[i].parse::<f64>().with_context(|| format!("`{}` is no number", &record[i]));
             let (cost, psnr_db) = (scale * number(column)?, number(psnr)?);
             let (parameter, setting) = (record[parameter].to_owned(), record[setting].to_owned());
@@ -152,8 +161,15 @@ fn parameter_of(setting: &str) -> String {
     }
 }
 
-fn rows<T: DeserializeOwned>(mut reader: csv::Reader<&[u8]>) -> Result<Vec<T>> {
-    let rows = reader.deserialize().collect::<Result<Vec<T>, _>>()?;
+/// * `numbers`: columns that have to be finite where they are given.
+fn rows<T: DeserializeOwned>(mut reader: csv::Reader<&[u8]>, numbers: &[&str]) -> Result<Vec<T>> {
+    let header = reader.headers()?.clone();
+    let mut rows: Vec<T> = Vec::new();
+    for record in reader.records() {
+        let record = record?;
+        refuse_infinite(&header, &record, numbers)?;
+        rows.push(record.deserialize(Some(&header))?);
+    }
     if rows.is_empty() {
         bail!("it has no row to draw; let the run go further");
     }
@@ -226,5 +242,25 @@ mod tests {
         assert!(message("iteration,psnr_db,anchors\n").contains("no row"));
         let wrong = message("iteration,psnr_db,anchors\n3,1.0,5\n6,good,5\n");
         assert!(wrong.contains("line: 3"), "{wrong}");
+    }
+
+    #[test]
+    fn a_number_without_end_is_refused_by_line_and_column_in_every_kind_of_file() {
+        let costs = "knob,setting,PSNR,host_s,m4 instructions,m4 on_front,host on_front\nlevel,exact,";
+        for (text, place) in [
+            ("iteration,psnr_db,anchors\n3,,5\n6,inf,5\n".to_owned(), "line 3, column psnr_db: found `inf`"),
+            ("iteration,psnr_db,anchors,seconds\n3,1,5,NaN\n".to_owned(), "line 2, column seconds: found `NaN`"),
+            (format!("{costs}inf,0.002,4e7,false,true\n"), "line 2, column PSNR: found `inf`"),
+            (format!("{costs}30,0.002,inf,false,true\n"), "line 2, column m4 instructions: found `inf`"),
+            (format!("{costs}30,-inf,4e7,false,true\n"), "line 2, column host_s: found `-inf`"),
+            (
+                "run,setting,processor_minutes,PSNR,Size [Bytes]\na,as the first,3,33,infinity\n".to_owned(),
+                "line 2, column Size [Bytes]: found `infinity`",
+            ),
+        ] {
+            let error = format!("{:#}", read(&text).unwrap_err());
+            let needed = format!("{place}, needed: a finite number; correct it, or take the row out");
+            assert!(error.contains("some.csv") && error.contains(&needed), "{error}");
+        }
     }
 }

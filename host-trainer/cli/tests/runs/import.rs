@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use pocketsplat_gaussians::{Format, Gaussians, Notes};
+use pocketsplat_gaussians::{Format, Frame, Gaussians, Notes};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -248,6 +248,53 @@ fn splats_are_looked_at_without_training() {
     fs::write(&bundle, undisturbed()).unwrap();
     let said = fails(pocketsplat().arg("view").arg(&bundle).args(["--around", "-o"]).arg(&page));
     assert!(said.contains("a bundle has a camera of its own"), "{said}");
+}
+
+/// Numbers of a file that lie elsewhere in its scene are drawn where they are.
+#[test]
+fn splats_whose_numbers_are_not_the_scenes_are_seen() {
+    let home = folder("import_frame");
+    let (here, moved) = (home.join("here.ply"), home.join("moved.ply"));
+    write(&here, &ball(), &[]);
+    let frame = Frame { offset: [100.0, -30.0, 0.0], scale: 2.0 };
+    let notes = Notes { frame, ..Notes::default() };
+    fs::write(&moved, Format::Ply.write(&ball(), &notes).unwrap().bytes).unwrap();
+    let picture = |splats: &Path| {
+        let picture = home.join("a.png");
+        succeeds(pocketsplat().arg("render").arg(splats).args(["--preview", "-w", "-o"]).arg(&picture));
+        image::open(&picture).unwrap().into_rgb8()
+    };
+    assert!(picture(&here).pixels().any(|pixel| pixel.0 != [0; 3]));
+    assert!(picture(&moved) == picture(&here), "the same numbers from the same side");
+    // Cameras of the scene: the bundle lies there, too. One looks away.
+    let cameras = |name: &str, from: f64| {
+        let path = home.join(name);
+        let looks_away = |i: i32| i == 20;
+        let camera = |i: i32| {
+            let (x, z) = (114.0 + 0.1 * f64::from(i), if looks_away(i) { from + 30.0 } else { from });
+            format!(
+                r#"{{"width_px": 32, "height_px": 32, "focal_px": [40.0, 40.0], "principal_px": [16.0, 16.0],
+                "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": [{}, 16.0, {}]}}"#,
+                -x, -z
+            )
+        };
+        let all: Vec<String> = (0..21).map(camera).collect();
+        fs::write(&path, format!(r#"{{"cameras": [{}]}}"#, all.join(", "))).unwrap();
+        path
+    };
+    let with = |cameras: &Path| {
+        let mut command = pocketsplat();
+        command.arg("import").arg(&moved).arg("--cameras").arg(cameras).arg("-o").arg(home.join("a.psb"));
+        command.args(["--iterations", "100", "--json", "--feature-dim", "8", "--offsets", "3"]);
+        command
+    };
+    let (result, said) = imported(&mut with(&cameras("good.json", 0.0)));
+    assert!(said.contains("warning: of 19 cameras of ") && said.contains("good.json 18 see a Gaussian of "), "{said}");
+    assert!(result["drawn_offsets"].as_u64().unwrap() > 0, "{result}");
+    let bundle = fs::read(home.join("a.psb")).unwrap();
+    let said = fails(&mut with(&cameras("far.json", 1e4)));
+    assert!(said.contains("of 19 cameras of ") && said.contains("far.json 0 see a Gaussian of "), "{said}");
+    assert!(fs::read(home.join("a.psb")).unwrap() == bundle, "nothing is lost");
 }
 
 #[test]

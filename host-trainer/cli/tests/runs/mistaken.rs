@@ -1,6 +1,8 @@
 //! Files and captures that are not what a command takes them for: figures of them would look right and be wrong.
 
+use std::ffi::OsString;
 use std::fs;
+use std::os::unix::ffi::OsStringExt as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -208,6 +210,55 @@ fn a_figure_is_of_numbers_alone() {
     assert!(fails(&mut plot("a,30,1000\nb,31,0\n")).contains("a size is 0 bytes, needed: more than 0 (line 3"));
     let said = plot("a,30,1000\nb,31,2000\n").arg("--json").output().unwrap();
     assert!(serde_json::from_slice::<serde_json::Value>(&said.stdout).is_ok_and(|said| said.is_object()));
+    let learning = |psnr_db: &str| {
+        fs::write(&table, format!("iteration,psnr_db,anchors\n1,20,5\n2,,5\n3,{psnr_db},5\n")).unwrap();
+        let mut command = pocketsplat();
+        command.arg("plot").arg(&table).arg("-o").arg(home.join("l.svg"));
+        command
+    };
+    let said = fails(&mut learning("inf"));
+    let needed = "line 4, column psnr_db: found `inf`, needed: a finite number";
+    assert!(said.contains("r.csv cannot be plotted") && said.contains(needed), "{said}");
+    succeeds(&mut learning("21"));
+}
+
+#[test]
+fn a_run_from_no_point_is_refused_before_any_work() {
+    let home = folder("mistaken-points");
+    for (options, output) in [
+        (&["survey", "--random-points", "0"][..], "survey"),
+        (&["train", "--set", "capture.n_random_points=0"], "a.psb"),
+        (&["train", "--backbone", "3dgs", "--set", "capture.n_random_points=0"], "a.ply"),
+    ] {
+        let mut command = pocketsplat();
+        command.arg(options[0]).arg(capture()).args(&options[1..]).arg("-o").arg(home.join(output));
+        let said = fails(&mut command);
+        assert!(said.contains("asks for 0 random points, needed: 1 to 10,000,000"), "{options:?}: {said}");
+    }
+    assert_eq!(fs::read_dir(&home).unwrap().count(), 0, "nothing was written");
+}
+
+#[test]
+fn a_name_that_is_no_text_is_refused_before_any_work() {
+    let home = folder("mistaken-bytes");
+    let plan = home.join("plan.toml");
+    fs::write(&plan, format!("[captures.own]\nscene = {:?}\n", capture())).unwrap();
+    let odd = |ending: &[u8]| home.join(OsString::from_vec([&b"caf\xe9"[..], ending].concat()));
+    for (options, source, ending) in [
+        (&["train"][..], capture(), &b".psb"[..]),
+        (&["train", "--backbone", "3dgs"], capture(), b".ply"),
+        (&["train", "--backbone", "3dgs", "--set", "gaussians.iterations=9"], capture(), b".ply"),
+        (&["import"], Path::new("splats.ply"), b".psb"),
+        (&["survey"], capture(), b""),
+        (&["plan-runs", "--run"], &plan, b""),
+    ] {
+        let mut command = pocketsplat();
+        command.arg(options[0]).arg(source).args(&options[1..]).arg("-o").arg(odd(ending));
+        let said = fails(&mut command);
+        assert!(said.contains("caf\\xe9") && said.contains("is not UTF-8"), "{options:?}: {said}");
+        assert!(said.contains("rename it, or link to it by another name"), "{options:?}: {said}");
+    }
+    assert_eq!(fs::read_dir(&home).unwrap().count(), 1, "nothing but the plan");
 }
 
 #[test]

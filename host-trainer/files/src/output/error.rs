@@ -56,10 +56,11 @@ pub enum OutputError {
     Write { path: PathBuf, n_bytes: usize, source: io::Error },
 }
 
-/// Where a rename fails, and the name is the reason.
+/// Where the reason says what helps.
 fn remedy(source: &io::Error) -> &'static str {
     match source.kind() {
         io::ErrorKind::ResourceBusy => ", which is mounted by itself and cannot be replaced; choose another --output",
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => "; make room there, or choose another --output",
         _ => "",
     }
 }

@@ -211,31 +211,13 @@ fn flat_disks_and_harmonics_of_degree_4_are_read() {
 /// Bounds of one chunk, then words: what SuperSplat's description says of them.
 #[test]
 fn a_compressed_one_is_read() {
-    let floats = [
-        "min_x",
-        "min_y",
-        "min_z",
-        "max_x",
-        "max_y",
-        "max_z",
-        "min_scale_x",
-        "min_scale_y",
-        "min_scale_z",
-        "max_scale_x",
-        "max_scale_y",
-        "max_scale_z",
-        "min_r",
-        "min_g",
-        "min_b",
-        "max_r",
-        "max_g",
-        "max_b",
-    ];
+    let floats = "min_x min_y min_z max_x max_y max_z min_scale_x min_scale_y min_scale_z max_scale_x max_scale_y \
+        max_scale_z min_r min_g min_b max_r max_g max_b";
     let named =
         |kind: &str, names: &[String]| names.iter().map(|name| format!("property {kind} {name}\n")).collect::<String>();
     let header = format!(
         "ply\nformat binary_little_endian 1.0\nelement chunk 1\n{}element vertex 1\n{}element sh 1\n{}end_header\n",
-        named("float", &floats.map(str::to_owned)),
+        named("float", &floats.split(' ').map(str::to_owned).collect::<Vec<_>>()),
         named("uint", &["position", "rotation", "scale", "color"].map(|name| format!("packed_{name}"))),
         named("uchar", &(0..9).map(|number| format!("f_rest_{number}")).collect::<Vec<_>>()),
     );

@@ -23,6 +23,17 @@ pub fn of_file(frame: &Frame, normalisation: &Normalisation) -> Normalisation {
     Normalisation { centre, scale: normalisation.scale * frame.scale }
 }
 
+/// What takes the scene to the numbers of a file that lie in it as `frame` says.
+pub fn of_scene(frame: &Frame) -> Normalisation {
+    Normalisation { centre: DVec3::from(frame.offset), scale: 1.0 / frame.scale }
+}
+
+/// What takes the scene to the frame that `normalisation` makes of the numbers of a file: [`of_scene`], then that.
+pub fn of_scene_through_file(frame: &Frame, normalisation: &Normalisation) -> Normalisation {
+    let centre = DVec3::from(frame.offset) + normalisation.centre * frame.scale;
+    Normalisation { centre, scale: normalisation.scale / frame.scale }
+}
+
 /// Where numbers of the normalised frame lie in the scene.
 pub fn of_normalised(normalisation: &Normalisation) -> Frame {
     Frame { offset: normalisation.centre.to_array(), scale: 1.0 / normalisation.scale }
@@ -49,5 +60,10 @@ mod tests {
         let mut file = Gaussians { centres: vec![[1000.0, -2000.0, 0.0]], ..there };
         to_normalised(&mut file, &of_file(&millimetres, &normalisation));
         assert_eq!(file.centres, here.centres);
+        let of_numbers = of_file(&millimetres, &normalisation);
+        let of_scene_again = of_scene_through_file(&millimetres, &of_numbers);
+        let place = DVec3::new(2.0, -2.0, 2.0);
+        assert!((of_scene_again.point(place) - normalisation.point(place)).length() < 1e-12);
+        assert_eq!(of_scene(&millimetres).point(place), DVec3::new(1000.0, -2000.0, 0.0));
     }
 }

@@ -16,27 +16,21 @@ pub(super) fn add(list: &mut List, good: &Good) {
     };
     let padding =
         (0..2).map(chunk).find(|chunk| !chunk.end.is_multiple_of(4)).expect("a chunk with bytes behind it").end;
-    let reason = "A byte between two chunks is not 0.";
-    list.patched("padding-behind-chunk", reason, "OutOfRange { field: Padding", &file, padding, &[1]);
+    list.file("padding-behind-chunk", "A byte between two chunks is not 0.", "OutOfRange { field: Padding")
+        .patched((&file, padding), &[1]);
     let mut damaged = file.clone();
     damaged[chunk(1).start] ^= 4;
-    list.push("chunk-crc", "A bit of the second chunk is flipped.", "ChunkChecksum { chunk: 1", damaged);
+    list.file("chunk-crc", "A bit of the second chunk is flipped.", "ChunkChecksum { chunk: 1").of(damaged);
     let stream = |chunk: u32| format!("ChunkStream {{ chunk: {chunk}");
-    list.patched(
-        "chunk-stream",
-        "The last word of the last chunk is another.",
-        &stream(2),
-        &file,
-        chunk(2).end - 1,
-        &[0xA5],
-    );
+    list.file("chunk-stream", "The last word of the last chunk is another.", &stream(2))
+        .patched((&file, chunk(2).end - 1), &[0xA5]);
     for (name, draft) in [("grid", &good.grid), ("following", &good.following)] {
         let file = draft.clone().file();
         let bundle = Bundle::parse(&file).expect("a good file");
         let first = bundle.chunks().next().expect("three chunks");
         let end = section(&file, 8).1.start + first.n_bytes();
-        let reason = "The last word of the first chunk is another.";
-        list.patched(&format!("chunk-stream-{name}"), reason, &stream(0), &file, end - 1, &[0x5A]);
+        list.file(&format!("chunk-stream-{name}"), "The last word of the first chunk is another.", &stream(0))
+            .patched((&file, end - 1), &[0x5A]);
     }
     let edited = |edit: fn(usize, &mut Vec<u8>)| Draft { edit_chunk: Some(edit), ..good.tables.clone() }.file();
     for (name, reason, edit) in [
@@ -69,7 +63,7 @@ pub(super) fn add(list: &mut List, good: &Good) {
             }
         }),
     ] {
-        list.push(name, reason, &stream(0), edited(edit));
+        list.file(name, reason, &stream(0)).of(edited(edit));
     }
     // Two anchors of a trie become one, or three, wherever they are counted.
     for (name, reason, n) in [
@@ -86,25 +80,20 @@ pub(super) fn add(list: &mut List, good: &Good) {
         let record = directory + 2 * 12 + 24;
         counted[record + 8..record + 10].copy_from_slice(&n.to_le_bytes());
         reseal(&mut counted);
-        list.push(name, reason, &stream(0), counted);
+        list.file(name, reason, &stream(0)).of(counted);
     }
     let mut one_cell = good.tables.clone();
     for anchor in one_cell.tiers.iter_mut().flatten().flatten() {
         anchor.cell = [1, 2, 3];
     }
-    let reason = "Two anchors of a chunk in a lattice of one cell.";
-    list.push("one-cell-twice", reason, &stream(0), one_cell.file());
+    list.file("one-cell-twice", "Two anchors of a chunk in a lattice of one cell.", &stream(0)).of(one_cell.file());
     for group in 0..3 {
         let what = ["feature", "log-scale", "coordinate of an offset"][group];
         let name = ["feature-beyond-its-bits", "log-scale-beyond-its-bits", "offset-beyond-its-bits"][group];
         let mut bits = [16; 3];
         bits[group] = 2;
         let narrow = Draft { symbol_bits: Some(bits), ..good.tables.clone() };
-        list.push(
-            name,
-            &format!("A {what} has a symbol beyond the 2 bits that the header says."),
-            &stream(0),
-            narrow.file(),
-        );
+        list.file(name, &format!("A {what} has a symbol beyond the 2 bits that the header says."), &stream(0))
+            .of(narrow.file());
     }
 }

@@ -11,16 +11,17 @@ pub(super) fn add(list: &mut List, good: &Good) {
     let out = |field: &str, found: u32| format!("OutOfRange {{ field: {field}, found: {found},");
     let float = |index: u32| format!("BadFloat {{ field: InkFrame, index: {index}");
     let psnr = "BadFloat { field: ManifestPsnr";
-    list.in_section("psnr-infinite", "A PSNR is infinite.", psnr, &file, (6, 0), &INFINITE);
-    let reason = "A PSNR is not a number, of other bits than those of \\\"not measured\\\".";
-    list.in_section("psnr-nan", reason, psnr, &file, (6, 0), &0x7FC0_0001_u32.to_le_bytes());
-    list.in_section("level-6", "The first tier declares level 6.", &out("TierLevel", 6), &file, (6, 60), &[6]);
+    list.file("psnr-infinite", "A PSNR is infinite.", psnr).in_section((&file, 6, 0), &INFINITE);
+    list.file("psnr-nan", "A PSNR is not a number, of other bits than those of \\\"not measured\\\".", psnr)
+        .in_section((&file, 6, 0), &0x7FC0_0001_u32.to_le_bytes());
+    list.file("level-6", "The first tier declares level 6.", &out("TierLevel", 6)).in_section((&file, 6, 60), &[6]);
     let reason = "A reserved byte behind the level of the second tier is 1.";
-    list.in_section("level-reserved-byte", reason, "OutOfRange { field: TierLevel", &file, (6, 64 + 63), &[1]);
+    list.file("level-reserved-byte", reason, "OutOfRange { field: TierLevel").in_section((&file, 6, 64 + 63), &[1]);
     let long = good.tables.clone().with_section(6, |bytes| bytes.extend([0; 4]));
-    list.push("manifest-long", "The manifest has bytes of no tier.", "WrongLength { section: Manifest", long);
+    list.file("manifest-long", "The manifest has bytes of no tier.", "WrongLength { section: Manifest").of(long);
     let short = good.tables.clone().with_section(6, |bytes| bytes.truncate(bytes.len() - 4));
-    list.push("manifest-short", "The manifest lacks bytes of the last tier.", "Truncated { section: Manifest", short);
+    list.file("manifest-short", "The manifest lacks bytes of the last tier.", "Truncated { section: Manifest")
+        .of(short);
 
     let tiers = 2 * 12;
     let start = section(&file, 7).1.start;
@@ -33,110 +34,49 @@ pub(super) fn add(list: &mut List, good: &Good) {
         ("tier-end", "The first tier ends 4 bytes late.", 8, field(8) + 4, "TierEnd"),
     ] {
         let expected = if named.is_empty() { "OutOfRange".to_owned() } else { out(named, value) };
-        list.in_section(name, reason, &expected, &file, (7, at), &value.to_le_bytes());
+        list.file(name, reason, &expected).in_section((&file, 7, at), &value.to_le_bytes());
     }
     let reason = "The header has an anchor more than the last tier.";
     let n_anchors = read_u32(&file, 28);
-    list.patched("n-anchors", reason, "OutOfRange { field: NAnchors", &file, 28, &(n_anchors + 1).to_le_bytes());
-    list.in_section("ink-min-nan", "The ink's lowest corner is not a number.", &float(0), &file, (7, tiers), &NAN);
-    list.in_section(
-        "ink-min-infinite",
-        "The ink's lowest corner is infinite.",
-        &float(2),
-        &file,
-        (7, tiers + 8),
-        &INFINITE,
-    );
-    list.in_section(
-        "ink-step-negative",
-        "A step of the ink is negative.",
-        &float(1),
-        &file,
-        (7, tiers + 16),
-        &(-0.1_f32).to_le_bytes(),
-    );
-    let reason = "The highest corner that the ink's steps reach is infinite.";
-    list.in_section("ink-reach", reason, &float(0), &file, (7, tiers + 12), &1e35_f32.to_le_bytes());
+    list.file("n-anchors", reason, "OutOfRange { field: NAnchors").patched((&file, 28), &(n_anchors + 1).to_le_bytes());
+    list.file("ink-min-nan", "The ink's lowest corner is not a number.", &float(0)).in_section((&file, 7, tiers), &NAN);
+    list.file("ink-min-infinite", "The ink's lowest corner is infinite.", &float(2))
+        .in_section((&file, 7, tiers + 8), &INFINITE);
+    list.file("ink-step-negative", "A step of the ink is negative.", &float(1))
+        .in_section((&file, 7, tiers + 16), &(-0.1_f32).to_le_bytes());
+    list.file("ink-reach", "The highest corner that the ink's steps reach is infinite.", &float(0))
+        .in_section((&file, 7, tiers + 12), &1e35_f32.to_le_bytes());
     let record = tiers + 24;
     let len = field(record);
-    list.in_section(
-        "chunk-len-odd",
-        "A chunk has an odd number of bytes.",
-        &out("ChunkLen", 1),
-        &file,
-        (7, record),
-        &(len + 1).to_le_bytes(),
-    );
+    list.file("chunk-len-odd", "A chunk has an odd number of bytes.", &out("ChunkLen", 1))
+        .in_section((&file, 7, record), &(len + 1).to_le_bytes());
     let last = record + 2 * 24;
     let longer = (field(last) + 4).to_le_bytes();
-    list.in_section(
-        "chunk-len",
-        "The last chunk ends behind its tier.",
-        "OutOfRange { field: TierEnd",
-        &file,
-        (7, last),
-        &longer,
-    );
-    list.in_section(
-        "chunk-without-anchors",
-        "A chunk has no anchors.",
-        &out("ChunkAnchors", 0),
-        &file,
-        (7, record + 8),
-        &[0, 0],
-    );
-    list.in_section(
-        "chunk-too-large",
-        "A chunk has more anchors than max_chunk_anchors.",
-        &out("ChunkAnchors", 3),
-        &file,
-        (7, record + 8),
-        &[3, 0],
-    );
-    list.in_section(
-        "record-reserved",
-        "The reserved number of a chunk record is not 0.",
-        "OutOfRange { field: Reserved",
-        &file,
-        (7, record + 11),
-        &[1],
-    );
+    list.file("chunk-len", "The last chunk ends behind its tier.", "OutOfRange { field: TierEnd")
+        .in_section((&file, 7, last), &longer);
+    list.file("chunk-without-anchors", "A chunk has no anchors.", &out("ChunkAnchors", 0))
+        .in_section((&file, 7, record + 8), &[0, 0]);
+    list.file("chunk-too-large", "A chunk has more anchors than max_chunk_anchors.", &out("ChunkAnchors", 3))
+        .in_section((&file, 7, record + 8), &[3, 0]);
+    list.file("record-reserved", "The reserved number of a chunk record is not 0.", "OutOfRange { field: Reserved")
+        .in_section((&file, 7, record + 11), &[1]);
     let high = u16::from_le_bytes(*file[start + record + 18..].first_chunk().expect("a record"));
-    let reason = "The lowest corner of an ink box is above its highest.";
-    list.in_section(
-        "ink-box",
-        reason,
-        &out("InkBox", u32::from(high) + 1),
-        &file,
-        (7, record + 12),
-        &(high + 1).to_le_bytes(),
-    );
+    list.file("ink-box", "The lowest corner of an ink box is above its highest.", &out("InkBox", u32::from(high) + 1))
+        .in_section((&file, 7, record + 12), &(high + 1).to_le_bytes());
     let long = good.tables.clone().with_section(7, |bytes| bytes.extend([0; 24]));
-    list.push("directory-long", "There is a chunk record too many.", "WrongLength { section: Directory", long);
+    list.file("directory-long", "There is a chunk record too many.", "WrongLength { section: Directory").of(long);
     let short = good.tables.clone().with_section(7, |bytes| bytes.truncate(bytes.len() - 24));
-    list.push("directory-short", "There is a chunk record too few.", "Truncated { section: Directory", short);
+    list.file("directory-short", "There is a chunk record too few.", "Truncated { section: Directory").of(short);
 
     let baked = good.gaussians.clone().file();
     let too_many = 2 * 4 + 1;
     let reason = "There are more Gaussians in the first tier than offsets.";
-    list.in_section(
-        "gaussians-too-many",
-        reason,
-        &out("TierGaussians", too_many),
-        &baked,
-        (128, 0),
-        &too_many.to_le_bytes(),
-    );
+    list.file("gaussians-too-many", reason, &out("TierGaussians", too_many))
+        .in_section((&baked, 128, 0), &too_many.to_le_bytes());
     let first = read_u32(&baked, section(&baked, 128).1.start);
     let reason = "The first two tiers have fewer Gaussians than the first.";
-    list.in_section(
-        "gaussians-fall",
-        reason,
-        &out("TierGaussians", first - 1),
-        &baked,
-        (128, 4),
-        &(first - 1).to_le_bytes(),
-    );
+    list.file("gaussians-fall", reason, &out("TierGaussians", first - 1))
+        .in_section((&baked, 128, 4), &(first - 1).to_le_bytes());
     let long = good.gaussians.clone().with_section(128, |bytes| bytes.extend([0; 4]));
-    list.push("gaussians-long", "There are Gaussians of a tier too many.", "WrongLength { section: Gaussians", long);
+    list.file("gaussians-long", "There are Gaussians of a tier too many.", "WrongLength { section: Gaussians").of(long);
 }

@@ -5,47 +5,31 @@ use super::{Good, List, read_u32};
 pub(super) fn add(list: &mut List, good: &Good) {
     let bytes = good.tables.clone().file();
     let (file, detail) = (bytes.as_slice(), good.detail.clone().file());
-    list.push("empty", "The file has no bytes.", "NotABundle", Vec::new());
-    list.patched("magic", "The first byte is another.", "NotABundle", file, 0, &[0x88]);
-    list.patched(
-        "magic-line-ends",
-        "A text transfer changed the line ends of the magic.",
-        "NotABundle",
-        file,
-        4,
-        b"\n\x1a\n\x04",
-    );
-    list.push("cut-in-header", "The file ends in its header.", "Truncated { section: Header", file[..100].to_vec());
+    list.file("empty", "The file has no bytes.", "NotABundle").of(Vec::new());
+    list.file("magic", "The first byte is another.", "NotABundle").patched((file, 0), &[0x88]);
+    list.file("magic-line-ends", "A text transfer changed the line ends of the magic.", "NotABundle")
+        .patched((file, 4), b"\n\x1a\n\x04");
+    list.file("cut-in-header", "The file ends in its header.", "Truncated { section: Header").of(file[..100].to_vec());
     for version in [3, pocketsplat_format::bundle::VERSION + 1] {
         let expected = format!("UnsupportedVersion {{ found: {version}");
-        list.patched(
-            &format!("version-{version}"),
-            &format!("Version {version}."),
-            &expected,
-            file,
-            8,
-            &version.to_le_bytes(),
-        );
+        list.file(&format!("version-{version}"), &format!("Version {version}."), &expected)
+            .patched((file, 8), &version.to_le_bytes());
     }
     let header_len = u16::from_le_bytes([file[10], file[11]]);
     for (name, len) in [("header-len-short", 164 + 5 * 16), ("header-len-of-another-table", header_len + 16)] {
         let expected = format!("OutOfRange {{ field: HeaderLen, found: {len}");
         let reason = format!("header_len is {len}.");
-        list.patched(name, &reason, &expected, file, 10, &len.to_le_bytes());
+        list.file(name, &reason, &expected).patched((file, 10), &len.to_le_bytes());
     }
     let mut crc = file.to_vec();
     crc[44] ^= 1;
-    list.push(
-        "header-crc",
-        "A bit of the header is flipped and its CRC is as it was.",
-        "SectionChecksum { section: Header",
-        crc,
-    );
+    let reason = "A bit of the header is flipped and its CRC is as it was.";
+    list.file("header-crc", reason, "SectionChecksum { section: Header").of(crc);
     for bit in [9, 11, 31] {
         let bits = read_u32(file, 16) | 1 << bit;
         let expected = format!("UnsupportedFeatures {{ unknown_bits: {}", 1_u32 << bit);
         let reason = format!("Bit {bit} of the required features, which is reserved, is set.");
-        list.patched(&format!("feature-{bit}"), &reason, &expected, file, 16, &bits.to_le_bytes());
+        list.file(&format!("feature-{bit}"), &reason, &expected).patched((file, 16), &bits.to_le_bytes());
     }
     let out = |field: &str, found: u32| format!("OutOfRange {{ field: {field}, found: {found},");
     let u16s: [(&str, &str, usize, u16, &str); 13] = [
@@ -65,7 +49,7 @@ pub(super) fn add(list: &mut List, good: &Good) {
     ];
     for (name, reason, at, value, field) in u16s {
         let of = if name == "detail-hidden-0" || name == "detail-hidden-257" { detail.as_slice() } else { file };
-        list.patched(name, reason, &out(field, value.into()), of, at, &value.to_le_bytes());
+        list.file(name, reason, &out(field, value.into())).patched((of, at), &value.to_le_bytes());
     }
     let too_many = (1 << 24) + 1;
     let about_counts: [(&str, &str, usize, u32, &str); 2] = [
@@ -73,7 +57,7 @@ pub(super) fn add(list: &mut List, good: &Good) {
         ("n-chunks-above-anchors", "There are more chunks than anchors.", 32, 7, "NChunks"),
     ];
     for (name, reason, at, value, field) in about_counts {
-        list.patched(name, reason, &out(field, value), file, at, &value.to_le_bytes());
+        list.file(name, reason, &out(field, value)).patched((file, at), &value.to_le_bytes());
     }
     let u8s: [(&str, &str, usize, u8, &str); 10] = [
         ("camera-convention-1", "The camera convention is 1.", 38, 1, "CameraConvention"),
@@ -88,7 +72,7 @@ pub(super) fn add(list: &mut List, good: &Good) {
         ("header-reserved", "The reserved byte of the header is 1.", 159, 1, "Reserved"),
     ];
     for (name, reason, at, value, field) in u8s {
-        list.patched(name, reason, &out(field, value.into()), file, at, &[value]);
+        list.file(name, reason, &out(field, value.into())).patched((file, at), &[value]);
     }
     let float = |field: &str| format!("BadFloat {{ field: {field}");
     let floats: [(&str, &str, usize, f32, &str); 15] = [
@@ -115,7 +99,7 @@ pub(super) fn add(list: &mut List, good: &Good) {
         ),
     ];
     for (name, reason, at, value, field) in floats {
-        list.patched(name, reason, &float(field), file, at, &value.to_le_bytes());
+        list.file(name, reason, &float(field)).patched((file, at), &value.to_le_bytes());
     }
     let doubles: [(&str, &str, usize, f64); 4] = [
         ("normalisation-centre-infinite", "The normalisation's centre is infinite.", 64, f64::INFINITY),
@@ -124,22 +108,16 @@ pub(super) fn add(list: &mut List, good: &Good) {
         ("normalisation-scale-nan", "The normalisation's scale is not a number.", 80, f64::NAN),
     ];
     for (name, reason, at, value) in doubles {
-        list.patched(name, reason, &float("Normalisation"), file, at, &value.to_le_bytes());
+        list.file(name, reason, &float("Normalisation")).patched((file, at), &value.to_le_bytes());
     }
     for (name, at) in [("preview-width-0", 152), ("preview-height-0", 154)] {
-        list.patched(name, "The preview has no pixels.", &out("PreviewCamera", 0), file, at, &[0, 0]);
+        list.file(name, "The preview has no pixels.", &out("PreviewCamera", 0)).patched((file, at), &[0, 0]);
     }
     let row = |x: [f32; 3]| x.map(f32::to_le_bytes).concat();
     let rows = [row([1.0, 0.0, 0.0]), row([0.0, 1.0, 0.0]), row([0.0, 0.0, -1.0])].concat();
-    list.patched(
-        "preview-mirrored",
-        "The preview's rotation is a reflection.",
-        &out("PreviewRotation", 20_000),
-        file,
-        88,
-        &rows,
-    );
+    list.file("preview-mirrored", "The preview's rotation is a reflection.", &out("PreviewRotation", 20_000))
+        .patched((file, 88), &rows);
     let rows = [row([1.0, 0.0, 0.0]), row([0.0, 1.0, 0.0]), row([0.0, 0.0, 1.0302])].concat();
     let reason = "The preview's rotation is off by 302 ten-thousandths; 300 are allowed.";
-    list.patched("preview-not-quite-a-rotation", reason, &out("PreviewRotation", 302), file, 88, &rows);
+    list.file("preview-not-quite-a-rotation", reason, &out("PreviewRotation", 302)).patched((file, 88), &rows);
 }

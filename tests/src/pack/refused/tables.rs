@@ -6,34 +6,21 @@ pub(super) fn add(list: &mut List, good: &Good) {
     let file = good.tables.clone().file();
     let out = |field: &str, found: u32| format!("OutOfRange {{ field: {field}, found: {found},");
     let n_channels = good.tables.n_channels();
-    list.in_section("no-tables", "There are no tables.", &out("NTables", 0), &file, (4, 0), &[0, 0]);
-    list.in_section("361-tables", "There are 361 tables.", &out("NTables", 361), &file, (4, 0), &361_u16.to_le_bytes());
+    list.file("no-tables", "There are no tables.", &out("NTables", 0)).in_section((&file, 4, 0), &[0, 0]);
+    list.file("361-tables", "There are 361 tables.", &out("NTables", 361))
+        .in_section((&file, 4, 0), &361_u16.to_le_bytes());
     let other = n_channels as u16 - 1;
-    let reason = "The tables are of a channel less than C.";
-    list.in_section("channels-of-tables", reason, &out("NChannels", other.into()), &file, (4, 2), &other.to_le_bytes());
-    let reason = "Channel 1 has table 3 of 3.";
-    list.in_section("no-such-table", reason, "NoSuchTable { channel: 1, table: 3", &file, (4, 6), &[3, 0]);
+    list.file("channels-of-tables", "The tables are of a channel less than C.", &out("NChannels", other.into()))
+        .in_section((&file, 4, 2), &other.to_le_bytes());
+    list.file("no-such-table", "Channel 1 has table 3 of 3.", "NoSuchTable { channel: 1, table: 3")
+        .in_section((&file, 4, 6), &[3, 0]);
     let index = 4 + 2 * n_channels;
     let first = read_u32(&file, section(&file, 4).1.start + index);
     let second = read_u32(&file, section(&file, 4).1.start + index + 4);
-    let reason = "The second table begins 2 bytes too late.";
-    list.in_section(
-        "table-gap",
-        reason,
-        &out("TableOffset", second + 2),
-        &file,
-        (4, index + 4),
-        &(second + 2).to_le_bytes(),
-    );
-    let reason = "The first table begins inside the index.";
-    list.in_section(
-        "table-overlaps",
-        reason,
-        &out("TableOffset", first - 4),
-        &file,
-        (4, index),
-        &(first - 4).to_le_bytes(),
-    );
+    list.file("table-gap", "The second table begins 2 bytes too late.", &out("TableOffset", second + 2))
+        .in_section((&file, 4, index + 4), &(second + 2).to_le_bytes());
+    list.file("table-overlaps", "The first table begins inside the index.", &out("TableOffset", first - 4))
+        .in_section((&file, 4, index), &(first - 4).to_le_bytes());
     let table = first as usize;
     let scale = "BadFloat { field: TableScale, index: 0";
     for (name, reason, at, value) in [
@@ -45,19 +32,13 @@ pub(super) fn add(list: &mut List, good: &Good) {
         ("table-origin-nan", "The origin of a table is not a number.", 0, f32::NAN),
         ("table-origin-too-large", "The origin of a table is −10¹⁸.", 0, -1e18),
     ] {
-        list.in_section(name, reason, scale, &file, (4, table + at), &f32::to_le_bytes(value));
+        list.file(name, reason, scale).in_section((&file, 4, table + at), &f32::to_le_bytes(value));
     }
     let reason = "The last symbol of a table is 32768.";
     let n_symbols = u16::from_le_bytes(*file[section(&file, 4).1.start + table + 10..].first_chunk().expect("a table"));
     let min_symbol = (32769 - i32::from(n_symbols)) as i16;
-    list.in_section(
-        "table-symbols",
-        reason,
-        "OutOfRange { field: TableSymbols",
-        &file,
-        (4, table + 8),
-        &min_symbol.to_le_bytes(),
-    );
+    list.file("table-symbols", reason, "OutOfRange { field: TableSymbols")
+        .in_section((&file, 4, table + 8), &min_symbol.to_le_bytes());
     let bound = |entry: u16| format!("BadBound {{ section: Tables, table: 0, entry: {entry}");
     let last = n_symbols + 1;
     for (name, reason, entry, value, blamed) in [
@@ -67,17 +48,11 @@ pub(super) fn add(list: &mut List, good: &Good) {
         ("bounds-beyond-4096", "A bound is 4097.", last - 1, 4097, last - 1),
         ("bounds-end", "The last bound is 4095.", last, 4095, last),
     ] {
-        list.in_section(
-            name,
-            reason,
-            &bound(blamed),
-            &file,
-            (4, table + 12 + 2 * usize::from(entry)),
-            &value.to_le_bytes(),
-        );
+        list.file(name, reason, &bound(blamed))
+            .in_section((&file, 4, table + 12 + 2 * usize::from(entry)), &value.to_le_bytes());
     }
     let long = good.tables.clone().with_section(4, |bytes| bytes.extend([0, 0]));
-    list.push("tables-long", "Bytes are left behind the last table.", "WrongLength { section: Tables", long);
+    list.file("tables-long", "Bytes are left behind the last table.", "WrongLength { section: Tables").of(long);
     let short = good.tables.clone().with_section(4, |bytes| bytes.truncate(bytes.len() - 2));
-    list.push("tables-short", "The last table lacks its last bound.", "Truncated { section: Tables", short);
+    list.file("tables-short", "The last table lacks its last bound.", "Truncated { section: Tables").of(short);
 }

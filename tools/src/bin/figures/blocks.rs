@@ -9,9 +9,9 @@ use pocketsplat_instructions::Processor;
 use pocketsplat_trainer::{REVISION, revision_of};
 use serde::Deserialize;
 
-use super::in_repository;
 use super::plan::{Plan, Table};
 use super::rows::{self, Row};
+use super::{decoder, in_repository};
 
 const BEGIN: &str = "<!-- table ";
 const BEGIN_END: &str = " -->\n";
@@ -215,10 +215,11 @@ fn filled(plan: &Plan, page: &Path, text: &str) -> Result<String> {
         let name = &named[..end_of_name];
         let inside = begin + BEGIN.len() + end_of_name + BEGIN_END.len();
         let end = rest[inside..].find(END).with_context(|| format!("{}: table {name} has no end", page.display()))?;
-        let table = plan.tables.iter().find(|table| table.name == name);
-        let table = table.with_context(|| format!("{}: the plan has no table {name}", page.display()))?;
+        let of_plan = || plan.tables.iter().find(|table| table.name == name).map(Table::text);
+        let table = decoder::table(name).or_else(of_plan);
+        let table = table.with_context(|| format!("{}: no table is called {name}", page.display()))??;
         done += &rest[..inside];
-        done += &format!("\n{}\n", table.text()?);
+        done += &format!("\n{table}\n");
         rest = &rest[inside + end..];
         done += END;
         rest = &rest[END.len()..];
@@ -226,8 +227,13 @@ fn filled(plan: &Plan, page: &Path, text: &str) -> Result<String> {
     Ok(done + rest)
 }
 
+/// All pages that have blocks: the guides, and the decoder's page.
+fn pages_with_blocks() -> Result<Vec<PathBuf>> {
+    Ok([pages()?, vec![in_repository("decoder-core/README.md")]].concat())
+}
+
 pub(super) fn write(plan: &Plan) -> Result<()> {
-    for page in pages()? {
+    for page in pages_with_blocks()? {
         let text = fs::read_to_string(&page)?;
         let filled = filled(plan, &page, &text)?;
         if filled != text {
@@ -240,7 +246,7 @@ pub(super) fn write(plan: &Plan) -> Result<()> {
 /// Blocks that say something else than their CSVs.
 pub(super) fn faults(plan: &Plan) -> Result<Vec<String>> {
     let mut faults = Vec::new();
-    for page in pages()? {
+    for page in pages_with_blocks()? {
         let text = fs::read_to_string(&page)?;
         if filled(plan, &page, &text)? != text {
             faults.push(format!(

@@ -10,6 +10,7 @@
 
 mod blocks;
 mod board;
+mod decoder;
 mod guides;
 mod links;
 mod picture;
@@ -34,7 +35,7 @@ struct Args {
 enum What {
     /// Train and measure the runs of the plan that are not measured yet, and write their CSVs.
     Run(run::Args),
-    /// Fill the blocks of README and pages from the CSVs.
+    /// Fill the blocks of all pages from the CSVs.
     Write,
     /// Fail where a block is not what its CSV says, a guide holds a figure outside of blocks, or a link leads nowhere.
     Check,

@@ -25,13 +25,15 @@ pub(super) fn cases() -> Vec<Case> {
 
 fn paths() -> Vec<Case> {
     vec![
-        case("names without extension", Nerfstudio, Nothing, "unposed-image", &["warnings: 1,"], |f| {
+        case("names without extension", Nerfstudio, Nothing, "unposed-image", |f| {
             replace(f, ".png", "");
-        }),
-        case("names of JPEG for images of PNG", Nerfstudio, Nothing, "unposed-image", &["warnings: 1,"], |f| {
+        })
+        .says(&["warnings: 1,"]),
+        case("names of JPEG for images of PNG", Nerfstudio, Nothing, "unposed-image", |f| {
             replace(f, ".png", ".jpg");
-        }),
-        case("images converted to JPEG", ColmapText, Nothing, "missing-image", &["warnings: 1,"], |f| {
+        })
+        .says(&["warnings: 1,"]),
+        case("images converted to JPEG", ColmapText, Nothing, "missing-image", |f| {
             f.write_files();
             for photo in &f.photos {
                 let jpeg = photo.name.replace(".png", ".JPG");
@@ -41,8 +43,9 @@ fn paths() -> Vec<Case> {
                     .expect("JPEG");
                 f.remove(&format!("images/{}", photo.name));
             }
-        }),
-        case("images converted to WebP", Nerfstudio, Nothing, "image-format", &["warnings: 1,"], |f| {
+        })
+        .says(&["warnings: 1,"]),
+        case("images converted to WebP", Nerfstudio, Nothing, "image-format", |f| {
             f.write_files();
             for photo in &f.photos {
                 let webp = photo.name.replace(".png", ".webp");
@@ -52,32 +55,40 @@ fn paths() -> Vec<Case> {
                     .expect("WebP");
                 f.remove(&format!("images/{}", photo.name));
             }
-        }),
-        case("images converted beside the originals", ColmapText, Nothing, "image-format", &["warnings: 1,"], |f| {
+        })
+        .says(&["warnings: 1,"]),
+        case("images converted beside the originals", ColmapText, Nothing, "image-format", |f| {
             f.photos.iter_mut().for_each(|photo| photo.name = photo.name.replace(".png", ".heic"));
             f.write_files();
             f.photos.iter().for_each(|photo| f.write(&format!("images/{}", photo.name), b"\0\0\0\x18ftypheic"));
-        }),
-        case("names of no folder", Nerfstudio, Nothing, "missing-image", &["warnings: 1,"], |f| {
+        })
+        .says(&["warnings: 1,"]),
+        case("names of no folder", Nerfstudio, Nothing, "missing-image", |f| {
             replace(f, "./images/", "");
-        }),
-        case("names from the folder above", Nerfstudio, Nothing, "missing-image", &["warnings: 1,"], |f| {
+        })
+        .says(&["warnings: 1,"]),
+        case("names from the folder above", Nerfstudio, Nothing, "missing-image", |f| {
             replace(f, "./images/", "fox/images/");
-        }),
-        case("paths over a folder that is not there", Nerfstudio, Nothing, "unposed-image", &["warnings: 1,"], |f| {
+        })
+        .says(&["warnings: 1,"]),
+        case("paths over a folder that is not there", Nerfstudio, Nothing, "unposed-image", |f| {
             replace(f, "./images/", "colmap/../images/");
-        }),
-        case("absolute paths", Nerfstudio, Nothing, "unposed-image", &["warnings: 1,"], |f| {
+        })
+        .says(&["warnings: 1,"]),
+        case("absolute paths", Nerfstudio, Nothing, "unposed-image", |f| {
             let images = format!("{}/", f.at("images").display());
             replace(f, "./images/", &images);
-        }),
-        case("absolute paths of another machine", Nerfstudio, Nothing, "unposed-image", &["warnings: 1,"], |f| {
+        })
+        .says(&["warnings: 1,"]),
+        case("absolute paths of another machine", Nerfstudio, Nothing, "unposed-image", |f| {
             replace(f, "./images/", "/home/ann/photographs/");
-        }),
-        case("paths of Windows", Nerfstudio, Nothing, "unposed-image", &["warnings: 1,"], |f| {
+        })
+        .says(&["warnings: 1,"]),
+        case("paths of Windows", Nerfstudio, Nothing, "unposed-image", |f| {
             replace(f, "./images/", "C:\\\\Users\\\\ann\\\\fox\\\\images\\\\");
-        }),
-        case("backslashes in a model", ColmapText, Nothing, "missing-image", &["warnings: 1,"], |f| {
+        })
+        .says(&["warnings: 1,"]),
+        case("backslashes in a model", ColmapText, Nothing, "missing-image", |f| {
             f.photos.iter_mut().for_each(|photo| photo.name = format!("left\\{}", photo.name));
             std::fs::create_dir(f.at("images/left")).expect("a folder");
             for i in 0..super::N_VIEWS {
@@ -85,229 +96,175 @@ fn paths() -> Vec<Case> {
                 std::fs::rename(f.at("images").join(&name), f.at("images/left").join(&name)).expect("written");
             }
             f.write_files();
-        }),
-        case(
-            "names in a model that start with the folder",
-            ColmapBinary,
-            Nothing,
-            "unposed-image",
-            &["warnings: 1,"],
-            |f| {
-                f.photos.iter_mut().for_each(|photo| photo.name = format!("images/{}", photo.name));
-                f.write_files();
-            },
-        ),
-        case(
-            "renderings stored as JPEG names",
-            Blender,
-            Nothing,
-            "missing-image",
-            &["10 views to train, 2 to test"],
-            |f| {
-                f.photos.iter_mut().for_each(|photo| photo.name = photo.name.replace(".png", ".jpg"));
-                f.write_files();
-            },
-        ),
-        case("masks beside the images", Nerfstudio, Nothing, "unposed-image", &["warnings: 1,"], |f| {
+        })
+        .says(&["warnings: 1,"]),
+        case("names in a model that start with the folder", ColmapBinary, Nothing, "unposed-image", |f| {
+            f.photos.iter_mut().for_each(|photo| photo.name = format!("images/{}", photo.name));
+            f.write_files();
+        })
+        .says(&["warnings: 1,"]),
+        case("renderings stored as JPEG names", Blender, Nothing, "missing-image", |f| {
+            f.photos.iter_mut().for_each(|photo| photo.name = photo.name.replace(".png", ".jpg"));
+            f.write_files();
+        })
+        .says(&["10 views to train, 2 to test"]),
+        case("masks beside the images", Nerfstudio, Nothing, "unposed-image", |f| {
             f.photos[2].extra = "\"mask_path\": \"images/mask_02.png\", ".to_owned();
             f.write_image("images/mask_02.png", SIZE_PX);
             f.write_files();
-        }),
+        })
+        .says(&["warnings: 1,"]),
     ]
 }
 
 fn layouts() -> Vec<Case> {
     vec![
-        case("a model in `sparse` itself", ColmapBinary, Nothing, "several-models", &["COLMAP capture"], |f| {
+        case("a model in `sparse` itself", ColmapBinary, Nothing, "several-models", |f| {
             f.write_files();
             for name in ["cameras.bin", "images.bin", "points3D.bin"] {
                 std::fs::rename(f.at("sparse/0").join(name), f.at("sparse").join(name)).expect("written");
             }
-        }),
-        case("a model in `colmap/sparse/0`", ColmapText, Nothing, "several-models", &["COLMAP capture"], |f| {
+        })
+        .says(&["COLMAP capture"]),
+        case("a model in `colmap/sparse/0`", ColmapText, Nothing, "several-models", |f| {
             std::fs::create_dir(f.write_files().at("colmap")).expect("a folder");
             std::fs::rename(f.at("sparse"), f.at("colmap/sparse")).expect("written");
-        }),
-        case(
-            "transforms beside the model they were made from",
-            Nerfstudio,
-            Nothing,
-            "no-alpha",
-            &["nerfstudio"],
-            |f| {
-                f.write_files().write("colmap/sparse/0/cameras.bin", "");
-            },
-        ),
-        case("a second model that is not the first", ColmapBinary, Nothing, "several-models", &["COLMAP"], |f| {
+        })
+        .says(&["COLMAP capture"]),
+        case("transforms beside the model they were made from", Nerfstudio, Nothing, "no-alpha", |f| {
+            f.write_files().write("colmap/sparse/0/cameras.bin", "");
+        })
+        .says(&["nerfstudio"]),
+        case("a second model that is not the first", ColmapBinary, Nothing, "several-models", |f| {
             std::fs::rename(f.write_files().at("sparse/0"), f.at("sparse/4")).expect("written");
-        }),
-        case("photographs in `input`", ColmapText, Nothing, "image-folder", &["warnings: 1,"], |f| {
+        })
+        .says(&["COLMAP"]),
+        case("photographs in `input`", ColmapText, Nothing, "image-folder", |f| {
             std::fs::rename(f.write_files().at("images"), f.at("input")).expect("a folder");
-        }),
-        case("photographs beside `sparse`", ColmapBinary, Nothing, "unposed-image", &["warnings: 1,"], |f| {
+        })
+        .says(&["warnings: 1,"]),
+        case("photographs beside `sparse`", ColmapBinary, Nothing, "unposed-image", |f| {
             f.write_files();
             for photo in &f.photos {
                 std::fs::rename(f.at("images").join(&photo.name), f.at(&photo.name)).expect("written");
             }
             std::fs::remove_dir(f.at("images")).expect("empty");
-        }),
-        case(
-            "masks beside a model",
-            ColmapBinary,
-            Nothing,
-            "missing-masks",
-            &["pixels that do not count", ": 12"],
-            |f| {
-                f.write_files();
-                for (i, photo) in f.photos.iter().enumerate() {
-                    let name = if i.is_multiple_of(2) { format!("{}.png", photo.name) } else { photo.name.clone() };
-                    f.write_mask(&format!("masks/{name}"), SIZE_PX);
-                }
-            },
-        ),
-        case(
-            "masks at twice the size of the images",
-            ColmapText,
-            Nothing,
-            "bad-mask",
-            &["do not count", ": 12"],
-            |f| {
-                f.write_files();
-                for photo in &f.photos {
-                    f.write_mask(&format!("masks/{}", photo.name), (2 * SIZE_PX.0, 2 * SIZE_PX.1));
-                }
-            },
-        ),
-        case(
-            "photographs cut out of their background",
-            ColmapBinary,
-            Nothing,
-            "no-alpha",
-            &["note[alpha]", ": 12 ("],
-            |f| {
-                f.write_files();
-                for photo in &f.photos {
-                    let image = image::open(f.at("images").join(&photo.name)).expect("written").into_rgba8();
-                    image.save(f.at("images").join(&photo.name)).expect("an image");
-                }
-            },
-        ),
-        case("a fisheye", ColmapBinary, Nothing, "camera-model", &["images with lens distortion: 12"], |f| {
+        })
+        .says(&["warnings: 1,"]),
+        case("masks beside a model", ColmapBinary, Nothing, "missing-masks", |f| {
+            f.write_files();
+            for (i, photo) in f.photos.iter().enumerate() {
+                let name = if i.is_multiple_of(2) { format!("{}.png", photo.name) } else { photo.name.clone() };
+                f.write_mask(&format!("masks/{name}"), SIZE_PX);
+            }
+        })
+        .says(&["pixels that do not count", ": 12"]),
+        case("masks at twice the size of the images", ColmapText, Nothing, "bad-mask", |f| {
+            f.write_files();
+            for photo in &f.photos {
+                f.write_mask(&format!("masks/{}", photo.name), (2 * SIZE_PX.0, 2 * SIZE_PX.1));
+            }
+        })
+        .says(&["do not count", ": 12"]),
+        case("photographs cut out of their background", ColmapBinary, Nothing, "no-alpha", |f| {
+            f.write_files();
+            for photo in &f.photos {
+                let image = image::open(f.at("images").join(&photo.name)).expect("written").into_rgba8();
+                image.save(f.at("images").join(&photo.name)).expect("an image");
+            }
+        })
+        .says(&["note[alpha]", ": 12 ("]),
+        case("a fisheye", ColmapBinary, Nothing, "camera-model", |f| {
             f.cameras[0].model = (5, "OPENCV_FISHEYE");
             f.cameras[0].parameters = vec![20.0, 20.0, 12.0, 8.0, 0.01, 0.0, 0.0, 0.0];
             f.write_files();
-        }),
-        case(
-            "a fisheye of instant-ngp",
-            Nerfstudio,
-            Nothing,
-            "camera-model",
-            &["images with lens distortion: 12"],
-            |f| {
-                f.shared.push_str(", \"is_fisheye\": true, \"k1\": 0.01");
-                f.write_files();
-            },
-        ),
-        case("an export of Polycam", Nerfstudio, Nothing, "unposed-image", &["Polycam capture", "warnings: 1,"], |f| {
+        })
+        .says(&["images with lens distortion: 12"]),
+        case("a fisheye of instant-ngp", Nerfstudio, Nothing, "camera-model", |f| {
+            f.shared.push_str(", \"is_fisheye\": true, \"k1\": 0.01");
+            f.write_files();
+        })
+        .says(&["images with lens distortion: 12"]),
+        case("an export of Polycam", Nerfstudio, Nothing, "unposed-image", |f| {
             write_polycam(f, "corrected_cameras", "corrected_images");
-        }),
-        case(
-            "an export of Record3D",
-            Nerfstudio,
-            Nothing,
-            "unposed-image",
-            &["Record3D capture", "warnings: 1,"],
-            |f| {
-                write_record3d(f, "metadata", "rgbd", 0);
-            },
-        ),
-        case("a raw capture of NSVF", Nerfstudio, Nothing, "unposed-image", &["NSVF capture", "warnings: 1,"], |f| {
+        })
+        .says(&["Polycam capture", "warnings: 1,"]),
+        case("an export of Record3D", Nerfstudio, Nothing, "unposed-image", |f| {
+            write_record3d(f, "metadata", "rgbd", 0);
+        })
+        .says(&["Record3D capture", "warnings: 1,"]),
+        case("a raw capture of NSVF", Nerfstudio, Nothing, "unposed-image", |f| {
             write_nsvf(f, NSVF_MATRIX, |_| "");
-        }),
-        case(
-            "a model beside the images",
-            ColmapBinary,
-            Nothing,
-            "unposed-image",
-            &["COLMAP capture", "warnings: 1,"],
-            |f| {
-                f.write_files();
-                for name in ["cameras.bin", "images.bin", "points3D.bin"] {
-                    std::fs::rename(f.at("sparse/0").join(name), f.at(name)).expect("written");
-                }
-                std::fs::remove_dir_all(f.at("sparse")).expect("empty");
-            },
-        ),
-        case("a model of the distorted photographs", ColmapText, Nothing, "unposed-image", &["warnings: 1,"], |f| {
+        })
+        .says(&["NSVF capture", "warnings: 1,"]),
+        case("a model beside the images", ColmapBinary, Nothing, "unposed-image", |f| {
+            f.write_files();
+            for name in ["cameras.bin", "images.bin", "points3D.bin"] {
+                std::fs::rename(f.at("sparse/0").join(name), f.at(name)).expect("written");
+            }
+            std::fs::remove_dir_all(f.at("sparse")).expect("empty");
+        })
+        .says(&["COLMAP capture", "warnings: 1,"]),
+        case("a model of the distorted photographs", ColmapText, Nothing, "unposed-image", |f| {
             std::fs::create_dir(f.write_files().at("distorted")).expect("a folder");
             std::fs::rename(f.at("sparse"), f.at("distorted/sparse")).expect("written");
             std::fs::rename(f.at("images"), f.at("input")).expect("a folder");
             // Of the undistorted ones, which are of another shape.
             f.write_image("images/p_00.png", (20, 20));
-        }),
-        case(
-            "a dense reconstruction",
-            ColmapBinary,
-            Nothing,
-            "unposed-image",
-            &["COLMAP capture", "warnings: 1,"],
-            |f| {
-                f.write_files();
-                std::fs::create_dir_all(f.at("dense/0")).expect("a folder");
-                std::fs::rename(f.at("sparse/0"), f.at("dense/0/sparse")).expect("written");
-                std::fs::remove_dir(f.at("sparse")).expect("empty");
-                std::fs::rename(f.at("images"), f.at("dense/0/images")).expect("a folder");
-            },
-        ),
-        case("a plain fisheye", ColmapBinary, Nothing, "bad-model", &["images with lens distortion: 12"], |f| {
+        })
+        .says(&["warnings: 1,"]),
+        case("a dense reconstruction", ColmapBinary, Nothing, "unposed-image", |f| {
+            f.write_files();
+            std::fs::create_dir_all(f.at("dense/0")).expect("a folder");
+            std::fs::rename(f.at("sparse/0"), f.at("dense/0/sparse")).expect("written");
+            std::fs::remove_dir(f.at("sparse")).expect("empty");
+            std::fs::rename(f.at("images"), f.at("dense/0/images")).expect("a folder");
+        })
+        .says(&["COLMAP capture", "warnings: 1,"]),
+        case("a plain fisheye", ColmapBinary, Nothing, "bad-model", |f| {
             f.cameras[0].model = (14, "SIMPLE_FISHEYE");
             f.cameras[0].parameters = vec![20.0, 12.0, 8.0];
             f.write_files();
-        }),
-        case("a plain fisheye of two focal lengths", ColmapText, Nothing, "camera-model", &["distortion: 12"], |f| {
+        })
+        .says(&["images with lens distortion: 12"]),
+        case("a plain fisheye of two focal lengths", ColmapText, Nothing, "camera-model", |f| {
             f.cameras[0].model = (15, "FISHEYE");
             f.cameras[0].parameters = vec![20.0, 21.0, 12.0, 8.0];
             f.write_files();
-        }),
-        case("corrected folders of Polycam that are empty", Nerfstudio, Nothing, "too-few-views", &["Polycam"], |f| {
+        })
+        .says(&["distortion: 12"]),
+        case("corrected folders of Polycam that are empty", Nerfstudio, Nothing, "too-few-views", |f| {
             write_polycam(f, "cameras", "images");
             f.write("keyframes/corrected_cameras/.keep", "");
             f.write("keyframes/corrected_images/.keep", "");
-        }),
-        case(
-            "cameras of Metashape",
-            Nerfstudio,
-            Nothing,
-            "unposed-image",
-            &["Metashape capture", "warnings: 1,"],
-            |f| {
-                write_metashape(f, "frame");
-            },
-        ),
-        case(
-            "a table of RealityCapture",
-            Nerfstudio,
-            Nothing,
-            "unposed-image",
-            &["RealityCapture", "warnings: 1,"],
-            |f| {
-                write_realitycapture(f);
-            },
-        ),
-        case("a capture of LLFF", Nerfstudio, Nothing, "unposed-image", &["LLFF capture", "warnings: 1,"], |f| {
+        })
+        .says(&["Polycam"]),
+        case("cameras of Metashape", Nerfstudio, Nothing, "unposed-image", |f| {
+            write_metashape(f, "frame");
+        })
+        .says(&["Metashape capture", "warnings: 1,"]),
+        case("a table of RealityCapture", Nerfstudio, Nothing, "unposed-image", |f| {
+            write_realitycapture(f);
+        })
+        .says(&["RealityCapture", "warnings: 1,"]),
+        case("a capture of LLFF", Nerfstudio, Nothing, "unposed-image", |f| {
             write_llff(f, "<f8", |number| number.to_le_bytes().to_vec());
-        }),
-        case("a model of Bundler", Nerfstudio, Nothing, "no-points", &["Bundler capture", "warnings: 1,"], |f| {
+        })
+        .says(&["LLFF capture", "warnings: 1,"]),
+        case("a model of Bundler", Nerfstudio, Nothing, "no-points", |f| {
             write_bundler(f);
-        }),
-        case("a model of OpenSfM", Nerfstudio, Nothing, "no-points", &["OpenSfM capture", "several-models"], |f| {
+        })
+        .says(&["Bundler capture", "warnings: 1,"]),
+        case("a model of OpenSfM", Nerfstudio, Nothing, "no-points", |f| {
             write_opensfm(f);
-        }),
-        case("a rational lens", ColmapText, Nothing, "camera-model", &["images with lens distortion: 12"], |f| {
+        })
+        .says(&["OpenSfM capture", "several-models"]),
+        case("a rational lens", ColmapText, Nothing, "camera-model", |f| {
             f.cameras[0].model = (6, "FULL_OPENCV");
             f.cameras[0].parameters = vec![20.0, 20.0, 12.0, 8.0, 0.1, 0.0, 0.0, 0.0, 0.0, 0.1, 0.0, 0.0];
             f.write_files();
-        }),
+        })
+        .says(&["images with lens distortion: 12"]),
     ]
 }
 
@@ -329,53 +286,53 @@ const DECOMPOSED: &str = "Ba\u{308}ckerei";
 
 fn names() -> Vec<Case> {
     vec![
-        case("names decomposed on the disk", ColmapText, Nothing, "missing-image", &["the form of Unicode: 12"], |f| {
+        case("names decomposed on the disk", ColmapText, Nothing, "missing-image", |f| {
             rename(f, |i| format!("{DECOMPOSED}_{i:02}.png"));
             rename_in_model(f, |i| format!("Bäckerei_{i:02}.png"));
-        }),
-        case("folders decomposed on the disk", ColmapBinary, Nothing, "missing-image", &["warnings: 1,"], |f| {
+        })
+        .says(&["the form of Unicode: 12"]),
+        case("folders decomposed on the disk", ColmapBinary, Nothing, "missing-image", |f| {
             std::fs::create_dir(f.at("images").join(DECOMPOSED)).expect("a folder");
             rename(f, |i| format!("{DECOMPOSED}/p_{i:02}.png"));
             rename_in_model(f, |i| format!("Bäckerei/p_{i:02}.png"));
-        }),
-        case("names in another case", Nerfstudio, Nothing, "missing-image", &["upper and lower case", ": 12"], |f| {
+        })
+        .says(&["warnings: 1,"]),
+        case("names in another case", Nerfstudio, Nothing, "missing-image", |f| {
             rename(f, |i| format!("P_{i:02}.PNG"));
             f.write_files();
-        }),
-        case("a HEIC beside its conversion", ColmapText, Nothing, "image-format", &["warnings: 1,"], |f| {
+        })
+        .says(&["upper and lower case", ": 12"]),
+        case("a HEIC beside its conversion", ColmapText, Nothing, "image-format", |f| {
             rename(f, |i| format!("IMG_{i:02}.png"));
             rename_in_model(f, |i| format!("IMG_{i:02}.JPG"));
             f.photos.iter().for_each(|photo| f.write(&format!("images/{}", photo.name), b"\0\0\0\x18ftypheic"));
-        }),
-        case(
-            "depth maps beside the photographs",
-            ColmapText,
-            Nothing,
-            "unposed-image",
-            &["their name with another ending: 12 (`p_00.webp` is read, not `p_00.png`"],
-            |f| {
-                rename_in_model(f, |i| format!("p_{i:02}.jpg"));
-                for i in 0..super::N_VIEWS {
-                    let depth = f.at(&format!("images/p_{i:02}.png"));
-                    image::open(&depth).expect("written").save(depth.with_extension("webp")).expect("WebP");
-                    let far = [7; (SIZE_PX.0 * SIZE_PX.1 * 2) as usize];
-                    image::save_buffer(depth, &far, SIZE_PX.0, SIZE_PX.1, image::ExtendedColorType::L16).expect("PNG");
-                }
-            },
-        ),
-        case("names of three words without observations", ColmapText, Nothing, "bad-model", &["warnings: 1,"], |f| {
+        })
+        .says(&["warnings: 1,"]),
+        case("depth maps beside the photographs", ColmapText, Nothing, "unposed-image", |f| {
+            rename_in_model(f, |i| format!("p_{i:02}.jpg"));
+            for i in 0..super::N_VIEWS {
+                let depth = f.at(&format!("images/p_{i:02}.png"));
+                image::open(&depth).expect("written").save(depth.with_extension("webp")).expect("WebP");
+                let far = [7; (SIZE_PX.0 * SIZE_PX.1 * 2) as usize];
+                image::save_buffer(depth, &far, SIZE_PX.0, SIZE_PX.1, image::ExtendedColorType::L16).expect("PNG");
+            }
+        })
+        .says(&["their name with another ending: 12 (`p_00.webp` is read, not `p_00.png`"]),
+        case("names of three words without observations", ColmapText, Nothing, "bad-model", |f| {
             rename(f, |i| format!("my  photo {i:02}.png"));
             rename_in_model(f, |i| format!("my  photo {i:02}.png"));
             edit(f, "sparse/0/images.txt", |text| {
                 text.lines().filter(|line| line.contains("photo")).map(|line| format!("{line}\n")).collect()
             });
-        }),
-        case("names of a byte a letter", ColmapText, Nothing, "unreadable-file", &["warnings: 1,"], |f| {
+        })
+        .says(&["warnings: 1,"]),
+        case("names of a byte a letter", ColmapText, Nothing, "unreadable-file", |f| {
             rename(f, |i| format!("café_{i:02}.png"));
             rename_in_model(f, |i| format!("café_{i:02}.png"));
             let text = String::from_utf8(f.files()[1].1.clone()).expect("text");
             f.write("sparse/0/images.txt", text.chars().map(|c| c as u8).collect::<Vec<u8>>());
-        }),
+        })
+        .says(&["warnings: 1,"]),
     ]
 }
 
@@ -393,51 +350,59 @@ fn masks() -> Vec<Case> {
     }
     let says = &["masks: 12 views; of their pixels 33.3 % do not count (least 33.3 % of ", "warnings: 1,"];
     vec![
-        case("masks in the alpha channel", ColmapText, Nothing, "empty-masks", says, |f| {
+        case("masks in the alpha channel", ColmapText, Nothing, "empty-masks", |f| {
             let pixel = |counts: bool| vec![255, 255, 255, if counts { 255 } else { 0 }];
             write(f.write_files(), |name| format!("masks/{name}.png"), pixel, image::ExtendedColorType::Rgba8);
-        }),
-        case("masks of 16 bit with 0 and 1", ColmapBinary, Nothing, "bad-mask", says, |f| {
+        })
+        .says(says),
+        case("masks of 16 bit with 0 and 1", ColmapBinary, Nothing, "bad-mask", |f| {
             let pixel = |counts: bool| u16::from(counts).to_ne_bytes().to_vec();
             write(f.write_files(), |name| format!("masks/{name}"), pixel, image::ExtendedColorType::L16);
-        }),
-        case("masks of 16 bit under another ending", ColmapText, Nothing, "missing-masks", says, |f| {
+        })
+        .says(says),
+        case("masks of 16 bit under another ending", ColmapText, Nothing, "missing-masks", |f| {
             f.photos.iter_mut().for_each(|photo| photo.name = photo.name.replace(".png", ".jpg"));
             let pixel = |counts: bool| u16::from(counts).to_ne_bytes().to_vec();
             let name = |name: &str| format!("masks/{}", name.replace(".jpg", ".png"));
             write(f.write_files(), name, pixel, image::ExtendedColorType::L16);
-        }),
-        case("masks of labels", ColmapText, Nothing, "bad-mask", says, |f| {
+        })
+        .says(says),
+        case("masks of labels", ColmapText, Nothing, "bad-mask", |f| {
             write(
                 f.write_files(),
                 |name| format!("masks/{name}"),
                 |counts| vec![u8::from(counts)],
                 image::ExtendedColorType::L8,
             );
-        }),
-        case("masks of nearly black and nearly white", ColmapText, Nothing, "empty-masks", says, |f| {
+        })
+        .says(says),
+        case("masks of nearly black and nearly white", ColmapText, Nothing, "empty-masks", |f| {
             let pixel = |counts: bool| vec![if counts { 243 } else { 11 }];
             write(f.write_files(), |name| format!("masks/{name}"), pixel, image::ExtendedColorType::L8);
-        }),
-        case("dynamic masks of instant-ngp", Nerfstudio, Nothing, "unposed-image", says, |f| {
+        })
+        .says(says),
+        case("dynamic masks of instant-ngp", Nerfstudio, Nothing, "unposed-image", |f| {
             let name = |name: &str| format!("images/dynamic_mask_{name}");
             write(f.write_files(), name, |counts| vec![if counts { 0 } else { 255 }], image::ExtendedColorType::L8);
-        }),
+        })
+        .says(says),
     ]
 }
 
 fn texts() -> Vec<Case> {
     vec![
-        case("transforms behind a byte order mark", Nerfstudio, Nothing, "bad-transforms", &["warnings: 1,"], |f| {
+        case("transforms behind a byte order mark", Nerfstudio, Nothing, "bad-transforms", |f| {
             edit(f.write_files(), "transforms.json", |text| format!("\u{feff}{text}"));
-        }),
-        case("renderings behind a byte order mark", Blender, Nothing, "bad-transforms", &["2 to test"], |f| {
+        })
+        .says(&["warnings: 1,"]),
+        case("renderings behind a byte order mark", Blender, Nothing, "bad-transforms", |f| {
             f.write_files();
             for name in ["transforms_train.json", "transforms_test.json"] {
                 edit(f, name, |text| format!("\u{feff}{text}"));
             }
-        }),
-        case("a text model behind byte order marks", ColmapText, Nothing, "bad-model", &["warnings: 1,"], |f| {
+        })
+        .says(&["2 to test"]),
+        case("a text model behind byte order marks", ColmapText, Nothing, "bad-model", |f| {
             f.write_files();
             for name in ["cameras", "images", "points3D"] {
                 // Without the comment that would hide the mark.
@@ -445,11 +410,13 @@ fn texts() -> Vec<Case> {
                     format!("\u{feff}{}", text.lines().skip(1).collect::<Vec<_>>().join("\n"))
                 });
             }
-        }),
-        case("transforms in UTF-16", Nerfstudio, Nothing, "unreadable-file", &["warnings: 1,"], |f| {
+        })
+        .says(&["warnings: 1,"]),
+        case("transforms in UTF-16", Nerfstudio, Nothing, "unreadable-file", |f| {
             let text = String::from_utf8(f.files().remove(0).1).expect("text");
             let units = text.encode_utf16().flat_map(u16::to_le_bytes);
             f.write("transforms.json", [0xFF, 0xFE].into_iter().chain(units).collect::<Vec<u8>>());
-        }),
+        })
+        .says(&["warnings: 1,"]),
     ]
 }

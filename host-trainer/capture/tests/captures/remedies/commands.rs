@@ -13,33 +13,23 @@ fn remedies_for_captures_without_poses() {
         again(fixture)
     }
     check_all(&[
-        trouble("photographs", ColmapBinary, "find them, and give the folder `", |_| {}, reconstruct),
-        trouble(
-            "a camera of Polycam cut",
-            Nerfstudio,
-            "export the capture again",
-            |f| {
-                write_polycam(f, "cameras", "images");
-                f.write("keyframes/cameras/p_04.json", "{\"fx\": 20");
-            },
-            |f, _| {
-                let whole = std::fs::read(f.at("keyframes/cameras/p_05.json")).expect("written");
-                f.write("keyframes/cameras/p_04.json", whole);
-                again(f)
-            },
-        ),
-        trouble(
-            "cameras of Metashape without poses",
-            Nerfstudio,
-            "export again with File > Export > Export Cameras",
-            |f| {
-                f.write("cameras.xml", "<document><chunk><sensors/><cameras/></chunk></document>");
-            },
-            |f, _| {
-                write_metashape(f, "frame");
-                again(f)
-            },
-        ),
+        trouble("photographs", ColmapBinary, |_| {}).remedy("find them, and give the folder `", reconstruct),
+        trouble("a camera of Polycam cut", Nerfstudio, |f| {
+            write_polycam(f, "cameras", "images");
+            f.write("keyframes/cameras/p_04.json", "{\"fx\": 20");
+        })
+        .remedy("export the capture again", |f, _| {
+            let whole = std::fs::read(f.at("keyframes/cameras/p_05.json")).expect("written");
+            f.write("keyframes/cameras/p_04.json", whole);
+            again(f)
+        }),
+        trouble("cameras of Metashape without poses", Nerfstudio, |f| {
+            f.write("cameras.xml", "<document><chunk><sensors/><cameras/></chunk></document>");
+        })
+        .remedy("export again with File > Export > Export Cameras", |f, _| {
+            write_metashape(f, "frame");
+            again(f)
+        }),
     ]);
 }
 

@@ -5,53 +5,35 @@ use super::*;
 #[test]
 fn remedies_for_folders() {
     check_all(&[
-        trouble(
-            "a folder further out",
-            ColmapText,
-            "/fox` is one, give that",
-            |f| {
-                f.write_files();
-                std::fs::create_dir(f.at("fox")).expect("a folder");
-                for name in ["images", "sparse"] {
-                    std::fs::rename(f.at(name), f.at("fox").join(name)).expect("written");
-                }
-            },
-            |_, said| (named(said, " is one, give that"), LoadOptions::default()),
-        ),
-        trouble(
-            "several sizes",
-            ColmapBinary,
-            "choose one with `--images`",
-            |f| {
-                std::fs::rename(f.write_files().at("images"), f.at("images_2")).expect("a folder");
-                f.write_image("images_4/p_00.png", (6, 4));
-            },
-            |f, _| with(f, LoadOptions { images: Some("images_2".to_owned()), ..LoadOptions::default() }),
-        ),
-        trouble(
-            "no images",
-            ColmapText,
-            "put the photographs into `images`",
-            |f| {
-                std::fs::rename(f.write_files().at("images"), f.at("photos")).expect("a folder");
-            },
-            |f, _| {
-                std::fs::rename(f.at("photos"), f.at("images")).expect("a folder");
-                again(f)
-            },
-        ),
-        trouble(
-            "a file of poses missing",
-            ColmapBinary,
-            "check that the file is there and may be read",
-            |f| {
-                f.write_files().remove("sparse/0/images.bin");
-            },
-            |f, _| {
-                f.write_files();
-                again(f)
-            },
-        ),
+        trouble("a folder further out", ColmapText, |f| {
+            f.write_files();
+            std::fs::create_dir(f.at("fox")).expect("a folder");
+            for name in ["images", "sparse"] {
+                std::fs::rename(f.at(name), f.at("fox").join(name)).expect("written");
+            }
+        })
+        .remedy("/fox` is one, give that", |_, said| (named(said, " is one, give that"), LoadOptions::default())),
+        trouble("several sizes", ColmapBinary, |f| {
+            std::fs::rename(f.write_files().at("images"), f.at("images_2")).expect("a folder");
+            f.write_image("images_4/p_00.png", (6, 4));
+        })
+        .remedy("choose one with `--images`", |f, _| {
+            with(f, LoadOptions { images: Some("images_2".to_owned()), ..LoadOptions::default() })
+        }),
+        trouble("no images", ColmapText, |f| {
+            std::fs::rename(f.write_files().at("images"), f.at("photos")).expect("a folder");
+        })
+        .remedy("put the photographs into `images`", |f, _| {
+            std::fs::rename(f.at("photos"), f.at("images")).expect("a folder");
+            again(f)
+        }),
+        trouble("a file of poses missing", ColmapBinary, |f| {
+            f.write_files().remove("sparse/0/images.bin");
+        })
+        .remedy("check that the file is there and may be read", |f, _| {
+            f.write_files();
+            again(f)
+        }),
     ]);
     // As a part of the capture is given.
     let fixture = Fixture::new(ColmapText, N_VIEWS);

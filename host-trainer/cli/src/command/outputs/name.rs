@@ -6,58 +6,9 @@ use anyhow::{Result, bail};
 use pocketsplat_files::{Content, FileKind, shell_word};
 
 /// Endings of names that mean a format, ours or not: a file of another format does not get them.
-const KNOWN: [&str; 50] = [
-    "psb",
-    "ply",
-    "spz",
-    "sog",
-    "splat",
-    "ksplat",
-    "html",
-    "htm",
-    "png",
-    "apng",
-    "jpg",
-    "jpeg",
-    "gif",
-    "webp",
-    "heic",
-    "heif",
-    "avif",
-    "tif",
-    "tiff",
-    "bmp",
-    "exr",
-    "dng",
-    "mp4",
-    "mov",
-    "avi",
-    "mkv",
-    "webm",
-    "svg",
-    "csv",
-    "md",
-    "txt",
-    "json",
-    "toml",
-    "yaml",
-    "yml",
-    "xml",
-    "pdf",
-    "zip",
-    "gz",
-    "tar",
-    "7z",
-    "glb",
-    "gltf",
-    "obj",
-    "las",
-    "laz",
-    "npy",
-    "npz",
-    "r3d",
-    "checkpoint",
-];
+const KNOWN: &str = "psb ply spz sog splat ksplat html htm png apng jpg jpeg gif webp heic heif avif tif tiff bmp exr \
+    dng mp4 mov avi mkv webm svg csv md txt json toml yaml yml xml pdf zip gz tar 7z glb gltf obj las laz npy npz r3d \
+    checkpoint";
 
 fn ending(path: &Path) -> String {
     path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
@@ -74,7 +25,7 @@ pub(in crate::command) fn check_name(path: &Path, content: Content, source: Opti
         _ => return Ok(()),
     };
     let found = ending(path);
-    if own.contains(&found.as_str()) || !KNOWN.contains(&found.as_str()) {
+    if own.contains(&found.as_str()) || !KNOWN.split_whitespace().any(|known| known == found) {
         return Ok(());
     }
     let bundle = path.with_extension("psb");

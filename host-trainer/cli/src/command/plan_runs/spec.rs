@@ -7,6 +7,9 @@ use anyhow::{Context, Result, bail};
 use serde::Deserialize;
 use toml::{Table, Value};
 
+use crate::command::tables::OWN_NAMES;
+use crate::config::absolute;
+
 /// Options that name a point on a method's curve.
 const RATES: [&str; 5] = ["lambda", "bytes", "flash", "ram", "level"];
 /// Options that say how large images are.
@@ -14,6 +17,8 @@ const SIZES: [&str; 2] = ["max-resolution", "resolution"];
 const SEED: &str = "seed";
 /// Where the curve of a method without rates has its one point.
 const ONE_RATE: &str = "default";
+/// What no name of a file has everywhere.
+const NOT_IN_NAMES: &str = r#"/\:*?"<>|"#;
 
 /// A plan of runs, as its file has it.
 #[derive(Deserialize)]
@@ -68,7 +73,7 @@ impl Spec {
     /// Reads a plan; paths in it are relative to its folder.
     pub(super) fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).with_context(|| format!("could not read {}", path.display()))?;
-        let base = std::path::absolute(path).with_context(|| format!("{} is no path", path.display()))?;
+        let base = absolute(path)?;
         let base = base.parent().unwrap_or(Path::new(""));
         Self::parse(&text, base).with_context(|| format!("{} is no plan of runs", path.display()))
     }
@@ -77,10 +82,12 @@ impl Spec {
         let mut spec: Self = toml::from_str(text)?;
         spec.published = spec.published.map(|published| base.join(published));
         for (dataset, scenes) in &mut spec.captures {
+            check_dataset(dataset)?;
             let Value::Table(scenes) = scenes else {
                 bail!("`captures.{dataset}` is no table; needs SCENE = \"FOLDER\" in [captures.{dataset}]");
             };
             for (scene, capture) in scenes {
+                check_file_name("scene", scene)?;
                 let folder = match capture {
                     Value::Table(table) => table.get_mut("folder"),
                     other => Some(other),
@@ -273,6 +280,34 @@ fn text(value: &Value) -> String {
         Value::Array(values) => values.iter().map(text).collect::<Vec<_>>().join(","),
         other => other.to_string(),
     }
+}
+
+/// Refuses the name of a dataset that tables cannot have files of.
+fn check_dataset(name: &str) -> Result<()> {
+    check_file_name("dataset", name)?;
+    if OWN_NAMES.iter().any(|own| own.eq_ignore_ascii_case(name)) {
+        let own = OWN_NAMES.join(", ");
+        bail!(
+            "[captures] names a dataset `{name}`, and tables keep {own} for files of their own; give it another name"
+        );
+    }
+    Ok(())
+}
+
+/// Refuses a name that cannot be that of a file: tables and runs are called by it, and would lie in another folder.
+///
+/// * `what`: has the name.
+fn check_file_name(what: &str, name: &str) -> Result<()> {
+    let ends_badly = |end: Option<char>| end.is_none_or(|c| c == '.' || c.is_whitespace());
+    let has_bad = name.contains(|c: char| c.is_control() || NOT_IN_NAMES.contains(c));
+    if has_bad || ends_badly(name.chars().next()) || ends_badly(name.chars().next_back()) {
+        bail!(
+            "[captures] names a {what} `{}`, and files are called by it; needs a plain file name: no {NOT_IN_NAMES} or line break in \
+             it, no dot or space at its ends",
+            name.escape_debug()
+        );
+    }
+    Ok(())
 }
 
 /// A name that is one part of a path everywhere.

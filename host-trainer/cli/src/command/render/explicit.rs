@@ -45,9 +45,9 @@ impl Shown {
             let normalisation = Stand::normalisation(&bulk_of(&args.bundle, &file)?);
             let shots = cameras::of_file(path)?
                 .into_iter()
-                .map(|shot| Shot { camera: normalisation.camera(&shot.camera), ..shot })
+                .map(|shot| Shot { camera: normalisation.camera(&file.camera(&shot.camera)), ..shot })
                 .collect();
-            return Ok(Self { shots, drawer: file.renderer(&normalisation), background: [0.0; 3] });
+            return Ok(Self { shots, drawer: file.renderer_of_numbers(&normalisation), background: [0.0; 3] });
         }
         let size_px = args.options.resolution.map_or([SIDE_PX; 2], |frame| [frame.width_px, frame.height_px]);
         let stand = args.stand.stand(&args.bundle, &file)?;
@@ -57,7 +57,7 @@ impl Shown {
         let camera = |i: u16| normalisation.camera(&stand.turned(TAU * f64::from(i) / f64::from(n), size_px));
         Ok(Self {
             shots: (0..n).map(|i| Shot { name: name(i), camera: camera(i) }).collect(),
-            drawer: file.renderer(&normalisation),
+            drawer: file.renderer_of_numbers(&normalisation),
             background: [0.0; 3],
         })
     }

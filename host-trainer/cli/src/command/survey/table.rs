@@ -148,39 +148,36 @@ impl Table {
     }
 }
 
+fn or_dash(text: Option<String>) -> String {
+    text.unwrap_or_else(|| "–".to_owned())
+}
+
+fn fixed(value: Option<f64>, digits: usize) -> String {
+    or_dash(value.map(|value| format!("{value:.digits$}")))
+}
+
+/// What stands above a column, and what a line has in it.
+type Column = (&'static str, fn(&Line) -> String);
+
+const COLUMNS: [Column; 11] = [
+    ("method", |line| line.method.clone()),
+    ("rate", |line| line.submethod.clone()),
+    ("PSNR, dB", |line| format!("{:.2}", line.psnr_db)),
+    ("SSIM", |line| fixed(line.ssim, 3)),
+    ("LPIPS", |line| fixed(line.lpips, 3)),
+    ("kB", |line| fixed(line.size_bytes.map(|bytes| bytes / 1e3), 0)),
+    ("Gaussians", |line| fixed(line.n_gaussians, 0)),
+    ("anchors", |line| or_dash(line.n_anchors.map(|n| n.to_string()))),
+    ("RAM, kB", |line| fixed(line.ram_bytes.map(|bytes| bytes as f64 / 1e3), 0)),
+    ("decode, s", |line| fixed(line.decode_s, 2)),
+    ("train, s", |line| fixed(line.train_s, 0)),
+];
+
 /// A line each, in columns.
 fn text<'a>(lines: impl Iterator<Item = &'a Line>) -> String {
-    let heads = [
-        "method",
-        "rate",
-        "PSNR, dB",
-        "SSIM",
-        "LPIPS",
-        "kB",
-        "Gaussians",
-        "anchors",
-        "RAM, kB",
-        "decode, s",
-        "train, s",
-    ];
-    let or_dash = |text: Option<String>| text.unwrap_or_else(|| "–".to_owned());
-    let fixed = |value: Option<f64>, digits: usize| or_dash(value.map(|value| format!("{value:.digits$}")));
-    let cells = |line: &Line| {
-        [
-            line.method.clone(),
-            line.submethod.clone(),
-            format!("{:.2}", line.psnr_db),
-            fixed(line.ssim, 3),
-            fixed(line.lpips, 3),
-            fixed(line.size_bytes.map(|bytes| bytes / 1e3), 0),
-            fixed(line.n_gaussians, 0),
-            or_dash(line.n_anchors.map(|n| n.to_string())),
-            fixed(line.ram_bytes.map(|bytes| bytes as f64 / 1e3), 0),
-            fixed(line.decode_s, 2),
-            fixed(line.train_s, 0),
-        ]
-    };
-    let rows: Vec<[String; 11]> = std::iter::once(heads.map(str::to_owned)).chain(lines.map(cells)).collect();
+    let heads = COLUMNS.map(|(head, _)| head.to_owned());
+    let cells = |line: &Line| COLUMNS.map(|(_, cell)| cell(line));
+    let rows: Vec<[String; 11]> = std::iter::once(heads).chain(lines.map(cells)).collect();
     let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
     let widths: [usize; 11] = std::array::from_fn(width);
     let mut text = String::new();

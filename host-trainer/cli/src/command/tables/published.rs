@@ -5,7 +5,12 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use serde::Deserialize;
 
-use crate::plot::{Named, ResultRow, gathered};
+use crate::plot::{Named, ResultRow, gathered, refuse_infinite, refused};
+
+/// The column of sizes.
+const SIZE: &str = "Size [Bytes]";
+/// Columns that have to be finite where they are given.
+const NUMBERS: [&str; 5] = ["PSNR", "SSIM", "LPIPS", SIZE, "#Gaussians"];
 
 /// One published result, of a scene or the mean of a dataset.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -37,9 +42,7 @@ pub(in crate::command) struct PublishedRow {
 impl PublishedRow {
     /// Reads a table of them.
     pub(in crate::command) fn read_all(path: &Path) -> Result<Vec<Self>> {
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path);
-        let reader = reader.as_mut().map_err(|error| anyhow::anyhow!("{error}"));
-        let rows = reader.and_then(|reader| Ok(reader.deserialize().collect::<Result<Vec<Self>, _>>()?));
+        let rows = Self::read_rows(path);
         let rows = rows.with_context(|| format!("could not read the published results {}", path.display()))?;
         match rows.iter().find(|row| row.source.is_empty()) {
             Some(row) => {
@@ -47,6 +50,24 @@ impl PublishedRow {
             }
             None => Ok(rows),
         }
+    }
+
+    fn read_rows(path: &Path) -> Result<Vec<Self>> {
+        let reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path);
+        // Without its cause, which the text has already.
+        let mut reader = reader.map_err(|error| anyhow::anyhow!("{error}"))?;
+        let header = reader.headers()?.clone();
+        let mut rows = Vec::new();
+        for record in reader.records() {
+            let record = record?;
+            refuse_infinite(&header, &record, &NUMBERS)?;
+            let row: Self = record.deserialize(Some(&header))?;
+            if let Some(size) = row.size_bytes.filter(|size| *size <= 0.0) {
+                return Err(refused(&record, SIZE, &size.to_string(), "more than 0 bytes"));
+            }
+            rows.push(row);
+        }
+        Ok(rows)
     }
 
     /// As it is called where one name has to do.
@@ -98,6 +119,29 @@ pub(in crate::command) fn curves(rows: &[PublishedRow], dataset: &str, scene: &s
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_number_that_no_figure_can_show_is_refused_by_file_line_and_column() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("theirs.csv");
+        let read = |row: &str| {
+            let heads = "Dataset,Scene,Method,Submethod,PSNR,SSIM,LPIPS,Size [Bytes],#Gaussians,Source,Note";
+            std::fs::write(&path, format!("{heads}\nD,,HAC,low,30,,,1000,,a paper,\n{row}\n")).unwrap();
+            PublishedRow::read_all(&path)
+        };
+        for (row, said) in [
+            ("D,,HAC,high,inf,,,2000,,a paper,", "line 3, column PSNR: found `inf`, needed: a finite number"),
+            ("D,,HAC,high,31,0.9,NaN,2000,,a paper,", "line 3, column LPIPS: found `NaN`, needed: a finite number"),
+            ("D,,HAC,high,31,,,1e999,,a paper,", "line 3, column Size [Bytes]: found `1e999`, needed: a finite number"),
+            ("D,,HAC,high,31,,,-5,,a paper,", "line 3, column Size [Bytes]: found `-5`, needed: more than 0 bytes"),
+            ("D,,HAC,high,31,,,0,,a paper,", "line 3, column Size [Bytes]: found `0`, needed: more than 0 bytes"),
+        ] {
+            let error = format!("{:#}", read(row).unwrap_err());
+            assert!(error.contains("theirs.csv") && error.contains(said), "{error}");
+        }
+        let rows = read("D,,No size,,31,,,,,a paper,").unwrap();
+        assert_eq!((rows.len(), rows[1].size_bytes), (2, None), "what a paper does not give may be missing");
+    }
 
     #[test]
     fn what_no_row_of_known_size_beats_is_shown_and_rows_of_one_name_stay_apart() {

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{Background, Capture, Split};
-use pocketsplat_files::{Output, Outputs, shell_word};
+use pocketsplat_files::{Output, Outputs, shell_word, unused};
 use pocketsplat_gaussians::{Format, Notes};
 use pocketsplat_trainer::device::Limits;
 use pocketsplat_trainer::explicit::CloudTrainer;
@@ -195,14 +195,17 @@ fn train(
 ) -> Result<ExitCode> {
     // Not before: until here there is nothing to keep, and Ctrl-C may end the process at once.
     let stop = stop::flag()?;
-    let Some(result) = train_in(folder, config, capture, trainer, (&stop, GoesOn::Resume), output)? else {
+    let Some(result) =
+        train_in(folder, config, capture, trainer, (&stop, GoesOn::Resume(args.device_choice())), output)?
+    else {
         return Ok(ExitCode::from(stop::INTERRUPTED));
     };
     let (_, path) = args.named_paths(&config.dataset, &config.output);
     print_or(&result, args.json(), result.summary(path))?;
     if output.is_file() {
         let behind = if result.background == Background::White.to_string() { " --background white" } else { "" };
-        say!("compress it:  pocketsplat import {} -o scene.psb{behind}", shell_word(path));
+        let bundle = unused(Path::new("scene.psb"));
+        say!("compress it:  pocketsplat import {} -o {}{behind}", shell_word(path), shell_word(&bundle));
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -13,6 +13,7 @@ use pocketsplat_trainer::train::run::{Ending, Interval, Method, Newest, Run, Run
 
 use super::loading::keep_points;
 use super::result::{TrainResult, write_bundle};
+use crate::command::devices::DeviceChoice;
 use crate::command::estimate::{Before, Estimate};
 use crate::command::output::json;
 use crate::command::progress::Progress;
@@ -50,8 +51,8 @@ pub(crate) struct Attempt<'a> {
 /// How a run that was stopped goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum GoesOn {
-    /// By `train --resume`.
-    Resume,
+    /// By `train --resume`, on the device that was asked for.
+    Resume(DeviceChoice),
     /// By the command that began it.
     SameCommand,
 }
@@ -60,7 +61,7 @@ impl GoesOn {
     /// What to do where the capture is not the one that the run began with.
     const fn with_another_capture(self) -> &'static str {
         match self {
-            Self::Resume => "the run needs its own capture",
+            Self::Resume(_) => "the run needs its own capture",
             Self::SameCommand => "give the options of the first time again, or begin anew with --overwrite",
         }
     }
@@ -68,7 +69,10 @@ impl GoesOn {
     /// As a clause.
     pub(super) fn said(self, run: &Path) -> String {
         match self {
-            Self::Resume => format!("go on with `pocketsplat train --resume {}`", shell_word(run)),
+            Self::Resume(device) => {
+                let device = if device == DeviceChoice::Cpu { String::new() } else { format!(" --device {device}") };
+                format!("go on with `pocketsplat train --resume {}{device}`", shell_word(run))
+            }
             Self::SameCommand => "give the same command again to go on".to_owned(),
         }
     }

@@ -13,10 +13,18 @@ use pocketsplat_trainer::train::run::photographs_in;
 
 use super::loading::check_size;
 use super::*;
+use crate::command::devices::DeviceChoice;
 
 /// A run of a few seconds on the capture in `home`.
 fn attempt(stop: &AtomicBool) -> Attempt<'_> {
-    Attempt { device: None, stop, goes_on: GoesOn::Resume }
+    Attempt { device: None, stop, goes_on: GoesOn::Resume(DeviceChoice::Cpu) }
+}
+
+#[test]
+fn a_run_goes_on_with_the_device_that_was_asked_for() {
+    let said = |device| GoesOn::Resume(device).said(Path::new("a b.run"));
+    assert_eq!(said(DeviceChoice::Cpu), "go on with `pocketsplat train --resume 'a b.run'`");
+    assert_eq!(said(DeviceChoice::Gpu(Some(1))), "go on with `pocketsplat train --resume 'a b.run' --device gpu:1`");
 }
 
 fn config(home: &Path, name: &str) -> RunConfig {

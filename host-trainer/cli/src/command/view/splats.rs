@@ -36,7 +36,7 @@ pub(super) fn page(path: &Path, axes: AxesArgs, stand: &StandArgs) -> Result<Str
 
 fn pictures(file: &GaussiansFile, stand: &Stand) -> Result<String> {
     let normalisation = Stand::normalisation(&stand.bulk);
-    let renderer = file.renderer(&normalisation);
+    let renderer = file.renderer_of_numbers(&normalisation);
     let picture = |i: u16| {
         let camera = stand.turned(TAU * f64::from(i) / f64::from(N_PICTURES), [SIDE_PX; 2]);
         let image = renderer.image(&normalisation.camera(&camera), [0.0; 3]);

@@ -87,6 +87,27 @@ fn plans_that_mean_nothing_are_refused_by_what_is_wrong() {
 }
 
 #[test]
+fn what_files_are_called_by_is_a_plain_name_and_none_of_the_tables_own() {
+    let dataset = |name: &str| message(&format!("captures.{name:?}.lego = \"x\""));
+    let scene = |name: &str| message(&format!("captures.a.{name:?} = \"x\""));
+    for name in ["../../esc", "..", "", "a/b", "a\\b", "C:", ".hidden", "dot.", " a", "what?"] {
+        let needed = "needs a plain file name";
+        let (of_dataset, of_scene) = (dataset(name), scene(name));
+        assert!(of_dataset.contains("names a dataset") && of_dataset.contains(needed), "{name}: {of_dataset}");
+        assert!(of_scene.contains("names a scene") && of_scene.contains(needed), "{name}: {of_scene}");
+    }
+    for name in ["runs", "bd_rate", "comparison", "Runs"] {
+        let said = dataset(name);
+        assert!(said.contains(&format!("names a dataset `{name}`")), "{said}");
+        assert!(said.contains("tables keep runs, bd_rate, comparison"), "{said}");
+    }
+    for (dataset, scene) in [("a", "runs"), ("Tanks & Temples (T&T)", "Dr. Johnson"), ("mip-nerf_360.v2", "Übung")] {
+        let spec = parse(&format!("captures.{dataset:?}.{scene:?} = \"x\"")).unwrap();
+        assert_eq!(spec.runs().unwrap()[0].dataset, dataset, "{scene}");
+    }
+}
+
+#[test]
 fn a_plan_that_varies_nothing_is_one_run() {
     let runs = parse("captures.a.lego = \"x\"").unwrap().runs().unwrap();
     assert_eq!((runs.len(), &*runs[0].name, &*runs[0].method), (1, "lego/run", "ours"));

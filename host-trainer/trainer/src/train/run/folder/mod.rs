@@ -294,7 +294,7 @@ impl RunFolder {
         stop: &AtomicBool,
         mut advance: impl FnMut(&mut R) -> Result<LoggedStep, RunError>,
     ) -> Result<Ending, RunError> {
-        let mut log = ProgressLog::open(&self.path.join(LOG), run.iteration(), run.iterations())?;
+        let mut log = ProgressLog::open(&self.path.join(LOG), run)?;
         let (mut saved_at, mut write_s) = (Instant::now(), 0.0);
         let mut saved_iteration = None;
         loop {

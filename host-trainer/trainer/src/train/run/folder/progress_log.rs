@@ -40,15 +40,18 @@ pub struct ProgressLog {
     n: u32,
     bits: [f64; 3],
     n_sampled: usize,
+    /// Of a photograph in which a single value is off by one level.
+    least_squared_error: f64,
 }
 
 impl ProgressLog {
-    /// Opens the log of a run that has done `done` of `iterations`, and drops rows of later ones: they were written
-    /// after the checkpoint from which the run goes on, and will be written again.
+    /// Opens the log of a run, and drops rows of iterations that it has not done: they were written after the checkpoint from
+    /// which the run goes on, and will be written again.
     ///
     /// # Errors
     /// [`RunError`] when it cannot be read or written.
-    pub fn open(path: &Path, done: u32, iterations: u32) -> Result<Self, RunError> {
+    pub fn open(path: &Path, run: &impl Resumable) -> Result<Self, RunError> {
+        let done = run.iteration();
         let older = match fs::read(path) {
             // A power cut may leave anything.
             Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
@@ -66,9 +69,19 @@ impl ProgressLog {
                 .try_for_each(|row| write!(out, "{row}"))
         })?;
         let file = File::options().append(true).open(path).map_err(|source| RunError::io("open", path, source))?;
-        let every = (iterations / ROWS).max(1);
-        let path = path.to_owned();
-        Ok(Self { path, file, every, loss: 0.0, psnr_db: 0.0, n: 0, bits: [0.0; 3], n_sampled: 0 })
+        let every = (run.iterations() / ROWS).max(1);
+        let n_pixels: f64 = run.largest_px().map(f64::from).iter().product();
+        Ok(Self {
+            path: path.to_owned(),
+            file,
+            every,
+            loss: 0.0,
+            psnr_db: 0.0,
+            n: 0,
+            bits: [0.0; 3],
+            n_sampled: 0,
+            least_squared_error: 1.0 / (255.0 * 255.0 * 3.0 * n_pixels.max(1.0)),
+        })
     }
 
     /// Whether the run's last iteration ends a row.
@@ -83,7 +96,9 @@ impl ProgressLog {
     pub fn add(&mut self, run: &impl Resumable, step: &LoggedStep) -> Result<(), RunError> {
         if !step.is_dropped {
             self.loss += step.loss;
-            self.psnr_db -= 10.0 * step.squared_error.log10();
+            // A view that is reproduced exactly has an infinite PSNR, and so would every mean with it, which no curve shows. As
+            // `psnr_db_masked` has it, such a view counts as one in which a single value is off by one level.
+            self.psnr_db -= 10.0 * step.squared_error.max(self.least_squared_error).log10();
             self.n += 1;
             if let Some(rate) = step.rate {
                 let n = rate.n_sampled as f64;

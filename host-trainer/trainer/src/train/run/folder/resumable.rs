@@ -17,6 +17,8 @@ pub trait Resumable {
     fn n_dropped(&self) -> u32;
     /// Of the scene: its anchors, and the Gaussians that it may draw.
     fn size(&self) -> [usize; 2];
+    /// Width and height of the photograph of most pixels that it trains on.
+    fn largest_px(&self) -> [u32; 2];
     /// Has everything at hand that [`Self::size`] and [`Self::save`] tell of, where it is on a device.
     ///
     /// # Errors
@@ -50,6 +52,10 @@ impl<M: Method> Resumable for Run<'_, M> {
 
     fn size(&self) -> [usize; 2] {
         M::size(&self.state.learned)
+    }
+
+    fn largest_px(&self) -> [u32; 2] {
+        self.capture().largest_px()
     }
 
     fn fetch(&mut self) -> Result<(), RunError> {

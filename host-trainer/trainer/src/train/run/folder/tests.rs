@@ -153,6 +153,10 @@ impl Resumable for Unwritable {
         [0; 2]
     }
 
+    fn largest_px(&self) -> [u32; 2] {
+        [5, 4]
+    }
+
     fn save(&self, out: &mut dyn Write) -> std::io::Result<()> {
         out.write_all(b"half")?;
         Err(std::io::ErrorKind::StorageFull.into())
@@ -179,6 +183,22 @@ fn a_fork_has_a_folder_only_with_its_first_checkpoint() {
     let trainer = Trainer::new(&capture, tiny_config(ITERATIONS)).unwrap();
     let folder = RunFolder::start_from(&path, "a = 2", false, &trainer).unwrap();
     assert_eq!(names(&folder), ["config.toml", "iteration-00000000.checkpoint", "lock"]);
+}
+
+#[test]
+fn a_view_that_is_reproduced_exactly_has_a_psnr_that_a_curve_shows() {
+    let home = tempfile::tempdir().unwrap();
+    let path = home.path().join(LOG);
+    let mut log = ProgressLog::open(&path, &Unwritable).unwrap();
+    for squared_error in [0.0, 0.01] {
+        log.add(&Unwritable, &LoggedStep { loss: 0.5, squared_error, rate: None, is_dropped: false }).unwrap();
+    }
+    let text = fs::read_to_string(&path).unwrap();
+    let psnr = |row: &str| row.split(',').nth(2).unwrap().parse::<f64>().unwrap();
+    let found: Vec<f64> = text.lines().skip(1).map(psnr).collect();
+    // One of 60 values is off by one level.
+    let expected = [10.0 * (255.0 * 255.0 * 60.0_f64).log10(), 20.0];
+    assert!(found.len() == 2 && found.iter().zip(expected).all(|(found, psnr)| (found - psnr).abs() < 1e-3), "{text}");
 }
 
 #[test]

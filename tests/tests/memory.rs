@@ -217,8 +217,9 @@ fn the_most_tiers_that_fit_are_planned() {
                 Ok(plan) => {
                     assert!(plan.scratch_len() <= ram_bytes, "{ram_bytes} bytes: {plan:?}");
                     assert_eq!(Some(plan.n_tiers()), expected, "{ram_bytes} bytes: {plan:?}");
-                    let anchors = bundle.tier(plan.n_tiers() - 1).expect("a tier").n_anchors as f32;
-                    let rate = 1.0 - anchors / bundle.header().n_anchors as f32;
+                    let [all, drawn] =
+                        [bundle.header().n_anchors, bundle.tier(plan.n_tiers() - 1).expect("a tier").n_anchors];
+                    let rate = (all - drawn) as f32 / all as f32;
                     assert_eq!(plan.pruning_rate(), rate, "{ram_bytes} bytes: {plan:?}");
                     let again = Plan::new(&bundle, &free.in_bytes(plan.scratch_len())).map(|plan| plan.n_tiers());
                     assert_eq!(again, Ok(plan.n_tiers()), "its own bytes do: {plan:?}");

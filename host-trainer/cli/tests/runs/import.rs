@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use pocketsplat_gaussians::{Format, Frame, Gaussians, Notes};
+use pocketsplat_gaussians::{Format, Gaussians, Notes};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -256,9 +256,7 @@ fn splats_whose_numbers_are_not_the_scenes_are_seen() {
     let home = folder("import_frame");
     let (here, moved) = (home.join("here.ply"), home.join("moved.ply"));
     write(&here, &ball(), &[]);
-    let frame = Frame { offset: [100.0, -30.0, 0.0], scale: 2.0 };
-    let notes = Notes { frame, ..Notes::default() };
-    fs::write(&moved, Format::Ply.write(&ball(), &notes).unwrap().bytes).unwrap();
+    write(&moved, &ball(), &["Frame: scene = file * 2 + (100, -30, 0)"]);
     let picture = |splats: &Path| {
         let picture = home.join("a.png");
         succeeds(pocketsplat().arg("render").arg(splats).args(["--preview", "-w", "-o"]).arg(&picture));

@@ -227,7 +227,8 @@ job_npm() {
 # Not one of `jobs`, part of `test`: the kernels alone.
 job_gpu() {
   need_lavapipe
-  POCKETSPLAT_NEEDS_GPU=1 cargo test -p pocketsplat-gpu -p pocketsplat-trainer --lib --locked gpu
+  POCKETSPLAT_NEEDS_GPU=1 cargo test -p pocketsplat-gpu --lib --locked
+  POCKETSPLAT_NEEDS_GPU=1 cargo test -p pocketsplat-trainer --lib --locked gpu
 }
 
 # Not one of `jobs`: writes the module that `viewer` compares with.

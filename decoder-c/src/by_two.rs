@@ -1,7 +1,7 @@
 //! A frame drawn on two cores.
 
 use core::ffi::c_void;
-use core::mem::{align_of, size_of};
+use core::mem::{MaybeUninit, align_of, size_of};
 
 use pocketsplat_core::{Bundle, DecodeError, Plan};
 
@@ -25,8 +25,22 @@ impl Placed for Pair {
     const TWO_PAINTERS: u8 = 1;
     const OTHER_CALL: &'static str = "two_painters needs to be 1 for psb_bind_two; psb_bind takes 0";
 
-    fn bound(bundle: &Bundle<'static>, plan: Plan, regions: [&'static mut [u8]; 2]) -> Result<Self, DecodeError> {
-        pocketsplat_core::Decoder::bind_two(bundle, plan, regions).map(Self)
+    #[inline(never)]
+    fn bind_at(
+        place: &mut MaybeUninit<Self>,
+        bundle: &Bundle<'static>,
+        plan: &Plan,
+        regions: [&'static mut [u8]; 2],
+    ) -> Result<(), DecodeError> {
+        let place = place.as_mut_ptr();
+        match pocketsplat_core::Decoder::bind_two(bundle, *plan, regions) {
+            Ok(painters) => {
+                // SAFETY: memory of a pair, of which nothing is read; its only field is written.
+                unsafe { (&raw mut (*place).0).write(painters) };
+                Ok(())
+            }
+            Err(error) => Err(error),
+        }
     }
 }
 

@@ -1,13 +1,13 @@
 //! A decoder in the caller's memory.
 
 use core::ffi::c_void;
-use core::mem::{align_of, size_of};
+use core::mem::{MaybeUninit, align_of, size_of};
 use core::slice;
 
 use pocketsplat_core::{Bundle, DecodeError, Drawing, FrameReport, PixelFormat, Plan, Tile, TileSink};
 
 use crate::camera::Camera;
-use crate::plan::{Budget, bytes_of, planned};
+use crate::plan::{Budget, bytes_of, with_plan};
 use crate::status::{Failure, Message, Status, status_of};
 
 /// Bytes that suffice for a psb_decoder on every target.
@@ -154,7 +154,15 @@ pub(crate) trait Placed: Sized {
     const TWO_PAINTERS: u8;
     const OTHER_CALL: &'static str;
 
-    fn bound(bundle: &Bundle<'static>, plan: Plan, regions: [&'static mut [u8]; 2]) -> Result<Self, DecodeError>;
+    /// Makes it in `place`; an error leaves that as it was.
+    // What decoder-core returns is moved once, out of its result: a result of `Self` would lie on the stack several times. Not inlined, for the
+    // caller's stack frame would keep it while bundles are checked.
+    fn bind_at(
+        place: &mut MaybeUninit<Self>,
+        bundle: &Bundle<'static>,
+        plan: &Plan,
+        regions: [&'static mut [u8]; 2],
+    ) -> Result<(), DecodeError>;
 }
 
 impl Placed for Decoder {
@@ -163,8 +171,25 @@ impl Placed for Decoder {
     const TWO_PAINTERS: u8 = 0;
     const OTHER_CALL: &'static str = "two_painters needs to be 0 for psb_bind; psb_bind_two takes 1";
 
-    fn bound(bundle: &Bundle<'static>, plan: Plan, regions: [&'static mut [u8]; 2]) -> Result<Self, DecodeError> {
-        Ok(Self { begun: None, bound: pocketsplat_core::Decoder::bind(bundle, plan, regions)? })
+    #[inline(never)]
+    fn bind_at(
+        place: &mut MaybeUninit<Self>,
+        bundle: &Bundle<'static>,
+        plan: &Plan,
+        regions: [&'static mut [u8]; 2],
+    ) -> Result<(), DecodeError> {
+        let place = place.as_mut_ptr();
+        match pocketsplat_core::Decoder::bind(bundle, *plan, regions) {
+            Ok(bound) => {
+                // SAFETY: memory of a decoder, of which nothing is read; both of its fields are written.
+                unsafe {
+                    (&raw mut (*place).bound).write(bound);
+                    (&raw mut (*place).begun).write(None);
+                }
+                Ok(())
+            }
+            Err(error) => Err(error),
+        }
     }
 }
 
@@ -202,20 +227,21 @@ pub(crate) unsafe fn bind<T: Placed>(
         {
             return Err(Failure::Misuse(T::OTHER_CALL));
         }
-        let (bundle, plan) = planned(bundle, budget)?;
-        if scratch.is_null() && plan.scratch_len() > 0 {
-            return Err(Failure::Misuse("scratch is NULL"));
-        }
-        if slow.is_null() && plan.slow_scratch_len() > 0 {
-            return Err(Failure::Misuse("slow is NULL, and the plan takes slow memory"));
-        }
-        // SAFETY: the caller's promise.
-        let regions = unsafe { [memory_of(scratch, scratch_len), memory_of(slow, slow_len)] };
-        let bound = T::bound(&bundle, plan, regions)?;
-        // SAFETY: long enough and aligned, as was checked.
-        unsafe { place.write(bound) };
-        *made = place;
-        Ok(())
+        with_plan(bundle, budget, |bundle, plan| {
+            if scratch.is_null() && plan.scratch_len() > 0 {
+                return Err(Failure::Misuse("scratch is NULL"));
+            }
+            if slow.is_null() && plan.slow_scratch_len() > 0 {
+                return Err(Failure::Misuse("slow is NULL, and the plan takes slow memory"));
+            }
+            // SAFETY: the caller's promise.
+            let regions = unsafe { [memory_of(scratch, scratch_len), memory_of(slow, slow_len)] };
+            // SAFETY: not NULL, long enough and aligned, as was checked; nobody else uses it, the caller's promise.
+            let uninit = unsafe { &mut *place.cast::<MaybeUninit<T>>() };
+            T::bind_at(uninit, bundle, plan, regions)?;
+            *made = place;
+            Ok(())
+        })
     })();
     status_of(outcome, message)
 }

@@ -111,15 +111,19 @@ impl From<&pocketsplat_core::Plan> for Plan {
     }
 }
 
-/// Checks a bundle and plans for it.
-pub(crate) fn planned(
+/// Checks a bundle, plans for it, and returns what `then` makes of both.
+// Neither is returned, nor taken out of its result: a stack frame would hold it several times.
+pub(crate) fn with_plan<R>(
     bundle: Option<&'static [u8]>,
     budget: Option<&Budget>,
-) -> Result<(Bundle<'static>, pocketsplat_core::Plan), Failure> {
-    let bundle = Bundle::parse(bundle.ok_or(Failure::Misuse("bundle is NULL"))?)?;
+    then: impl FnOnce(&Bundle<'static>, &pocketsplat_core::Plan) -> Result<R, Failure>,
+) -> Result<R, Failure> {
+    let parsed = Bundle::parse(bundle.ok_or(Failure::Misuse("bundle is NULL"))?);
+    let bundle = parsed.as_ref().map_err(|&error| Failure::Decode(error))?;
     let budget = budget.ok_or(Failure::Misuse("budget is NULL"))?.to_core()?;
-    let plan = pocketsplat_core::Plan::new(&bundle, &budget)?;
-    Ok((bundle, plan))
+    let planned = pocketsplat_core::Plan::new(bundle, &budget);
+    let plan = planned.as_ref().map_err(|&error| Failure::Decode(error))?;
+    then(bundle, plan)
 }
 
 /// The caller's bytes; nothing for NULL.
@@ -167,7 +171,7 @@ pub unsafe extern "C" fn psb_make_plan(
     let outcome = (|| {
         let plan = plan.ok_or(Failure::Misuse("plan is NULL"))?;
         *plan = Plan::default();
-        let (_, found) = planned(bundle, budget).inspect_err(|failure| {
+        *plan = with_plan(bundle, budget, |_, found| Ok(Plan::from(found))).inspect_err(|failure| {
             if let Failure::Decode(DecodeError::BudgetTooSmall { region, needed, .. }) = failure {
                 match region {
                     Region::Fast => plan.scratch_bytes = *needed as usize,
@@ -175,7 +179,6 @@ pub unsafe extern "C" fn psb_make_plan(
                 }
             }
         })?;
-        *plan = Plan::from(&found);
         Ok(())
     })();
     status_of(outcome, message)

@@ -121,6 +121,11 @@ fn chunks_out_of_view_are_work_too() {
         let error = advanced(&bundle, &budget.with_most_work(work - 1), &away).err();
         assert!(matches!(error, Some(DecodeError::TooMuchWork { .. })), "{error:?}: {budget:?}");
     }
+    // The search for damage ends at the limit; the step behind it goes over the directory once.
+    let in_slabs = of_strips.with_overflow(Overflow::Slabs).skipping_damage().with_most_work(3000);
+    let error = advanced(&bundle, &in_slabs, &away).err();
+    let Some(DecodeError::TooMuchWork { needed_so_far, .. }) = error else { panic!("{error:?}") };
+    assert!(u64::from(needed_so_far) << 10 < 3300 + 601 * 300, "{needed_so_far} kilo-instructions");
 }
 
 /// What damaged chunks took is not in the report, but it is work.

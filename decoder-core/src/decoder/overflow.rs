@@ -124,18 +124,15 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
     /// where that takes more work than the budget allows, which is the frame's first error then.
     pub(super) fn note_damage(&self, frame: &mut Frame) {
         for (chunk, _) in self.planned_chunks() {
-            frame.unreported = frame.unreported.saturating_add(CHUNK_LOOKED_AT);
-            if frame.view.sees_box(chunk.ink_box()) {
-                if self.source.is_streamed() {
-                    frame.unreported = frame.unreported.saturating_add(checksum_work(&chunk));
-                }
-                if frame.unreported > self.plan.budget().most_work {
-                    return;
-                }
-                if !self.is_sound(&chunk) {
-                    frame.report.chunks_damaged += 1;
-                    frame.report.first_damaged = frame.report.first_damaged.or(Some(chunk.index()));
-                }
+            let is_in_view = frame.view.sees_box(chunk.ink_box());
+            let checksum = if is_in_view && self.source.is_streamed() { checksum_work(&chunk) } else { 0 };
+            frame.unreported = frame.unreported.saturating_add(CHUNK_LOOKED_AT).saturating_add(checksum);
+            if frame.unreported > self.plan.budget().most_work {
+                return;
+            }
+            if is_in_view && !self.is_sound(&chunk) {
+                frame.report.chunks_damaged += 1;
+                frame.report.first_damaged = frame.report.first_damaged.or(Some(chunk.index()));
             }
         }
     }

@@ -46,8 +46,7 @@ pub(crate) fn put_range(bytes: &Bytes, body: &mut Vec<u8>) {
 /// # Errors
 /// Numbers that are not finite, or that no byte could stand for.
 pub(crate) fn range(body: &mut Body<'_>) -> Result<[f32; 2], Unreadable> {
-    let mut number = || Ok::<_, Unreadable>(f32::from_le_bytes(body.four("a range")?));
-    let [least, step] = [number()?, number()?];
+    let [least, step] = [body.number("a range")?, body.number("a range")?];
     if !(least.is_finite() && step >= 0.0 && (least + 255.0 * step).is_finite()) {
         return Err(Unreadable(format!(
             "a range begins at {least} in steps of {step}, needed: finite numbers, steps of 0 or more; write the file again"

@@ -8,6 +8,7 @@ use pocketsplat_kernels::ops::adam::{self, Moments, Step};
 use pocketsplat_kernels::ops::image::explicit_gaussians::Stored;
 use pocketsplat_kernels::real::Real;
 use pocketsplat_trainer::explicit::step::CloudGradients;
+use pocketsplat_trainer::train::optimiser::retain_rows;
 
 /// ε.
 const THRESHOLD: f32 = 0.01;
@@ -50,8 +51,7 @@ impl Masks {
     /// Drops those that `keep` does not mark.
     pub(crate) fn retain(&mut self, keep: &[bool]) {
         for values in [&mut self.logits, &mut self.moments.first, &mut self.moments.second] {
-            let mut kept = keep.iter();
-            values.retain(|_| kept.next() == Some(&true));
+            retain_rows(values, 1, keep);
         }
     }
 }

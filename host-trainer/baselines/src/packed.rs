@@ -71,6 +71,26 @@ pub(crate) fn put_bits(bits: &[bool], body: &mut Vec<u8>) {
     body.extend(bits.chunks(8).map(|bits| bits.iter().rev().fold(0, |byte, bit| byte << 1 | u8::from(*bit))));
 }
 
+/// Appends a count, in four bytes.
+pub(crate) fn put_count(count: usize, body: &mut Vec<u8>) {
+    body.extend(u32::try_from(count).expect("fewer than 2³²").to_le_bytes());
+}
+
+/// That symbols are below a bound.
+///
+/// # Errors
+/// The first that is not.
+pub(crate) fn all_below<S: Into<usize>>(
+    symbols: impl IntoIterator<Item = S>,
+    bound: usize,
+    what: &str,
+) -> Result<(), Unreadable> {
+    match symbols.into_iter().map(Into::<usize>::into).find(|symbol| *symbol >= bound) {
+        Some(symbol) => Err(Unreadable(format!("{what} is {symbol}, needed: less than {bound}; write the file again"))),
+        None => Ok(()),
+    }
+}
+
 /// A value as files keep it: the nearest half, the largest one for what is beyond.
 pub(crate) fn halved(value: f32) -> f16 {
     f16::from_f32(value.clamp(f16::MIN.to_f32(), f16::MAX.to_f32()))
@@ -90,15 +110,24 @@ impl<'a> Body<'a> {
         Ok(bytes)
     }
 
-    /// The next four, little-endian.
-    pub(crate) fn four(&mut self, what: &str) -> Result<[u8; 4], Unreadable> {
+    fn four(&mut self, what: &str) -> Result<[u8; 4], Unreadable> {
         let bytes = self.bytes(4, what)?;
         Ok(std::array::from_fn(|i| bytes[i]))
     }
 
+    /// The next four bytes as a count.
+    pub(crate) fn count(&mut self, what: &str) -> Result<usize, Unreadable> {
+        Ok(u32::from_le_bytes(self.four(what)?) as usize)
+    }
+
+    /// The next four bytes as a number, which need not be finite.
+    pub(crate) fn number(&mut self, what: &str) -> Result<f32, Unreadable> {
+        Ok(f32::from_le_bytes(self.four(what)?))
+    }
+
     /// How many Gaussians follow.
     pub(crate) fn n_gaussians(&mut self) -> Result<usize, Unreadable> {
-        let n = u32::from_le_bytes(self.four("the number of Gaussians")?) as usize;
+        let n = self.count("the number of Gaussians")?;
         if n > MOST_GAUSSIANS {
             return Err(Unreadable(format!(
                 "there are {n} Gaussians, needed: {MOST_GAUSSIANS} at most; write the file again"

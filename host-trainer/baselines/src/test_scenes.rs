@@ -28,6 +28,17 @@ pub(crate) fn gaussians(n: usize) -> Gaussians {
     gaussians
 }
 
+/// The same, and as many again that do not show.
+pub(crate) fn with_hidden(gaussians: &Gaussians) -> Gaussians {
+    let mut all = gaussians.clone();
+    all.centres.extend(&gaussians.centres);
+    all.log_scales.extend(&gaussians.log_scales);
+    all.rotations.extend(&gaussians.rotations);
+    all.opacity_logits.resize(all.centres.len(), -9.0);
+    all.harmonics.extend(&gaussians.harmonics);
+    all
+}
+
 /// `n` photographs of 24 × 20 pixels from around the origin, named by number.
 pub(crate) fn capture_of(gaussians: &Gaussians, n: u32) -> Capture {
     let renderer = Renderer::new(gaussians);

@@ -1,9 +1,7 @@
 //! The steps that come after training: stages of some length each, a training view a step.
 
 use pocketsplat_capture::dataset::View;
-use pocketsplat_gaussians::Degree;
 use pocketsplat_kernels::ops::Pinhole;
-use pocketsplat_kernels::ops::image::spherical_harmonics::MOST;
 use pocketsplat_kernels::ops::simd::Level;
 use pocketsplat_trainer::explicit::Cloud;
 use pocketsplat_trainer::explicit::optimiser::CloudOptimiser;
@@ -55,16 +53,9 @@ impl<'a> Tuning<'a> {
         Ok(Self { scene, level: Level::detect(), cameras, n_stages: 0, n_steps: 0 })
     }
 
-    /// The Gaussians as the optimiser takes them: with room for harmonics of degree 3.
+    /// The Gaussians as the optimiser takes them.
     pub(crate) fn cloud(&self) -> Cloud<f32> {
-        let drawn = Cloud::from(self.scene.gaussians);
-        let mut cloud = Cloud { degree: drawn.degree, ..Cloud::empty(Degree::Three) };
-        for i in 0..drawn.len() {
-            let mut harmonics = [[0.0; 3]; MOST];
-            harmonics[..drawn.n_coefficients].copy_from_slice(drawn.harmonics_of(i));
-            cloud.push(&drawn.stored(i), &harmonics);
-        }
-        cloud
+        Cloud::with_room(self.scene.gaussians)
     }
 
     /// The random numbers of the next stage.

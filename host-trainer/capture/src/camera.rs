@@ -52,7 +52,12 @@ impl Camera {
     }
 }
 
-/// The point nearest to all optical axes, see [`nearest_to_lines`].
+/// Cameras share a focus where the mean projector across their optical axes has at least this determinant; parallel axes give 0, axes from
+/// all sides (2/3)³.
+pub(crate) const MIN_DETERMINANT: f64 = 1e-3;
+
+/// The point nearest to all optical axes in the least-squares sense; `None` where the mean projector across them has a determinant of no
+/// more than `least_determinant`, as for parallel axes.
 pub fn nearest_to_axes<'a>(cameras: impl Iterator<Item = &'a Camera>, least_determinant: f64) -> Option<DVec3> {
     nearest_to_lines(cameras.map(|camera| (camera.centre_world(), camera.rotation.row(2))), least_determinant)
 }
@@ -62,7 +67,7 @@ pub fn nearest_to_axes<'a>(cameras: impl Iterator<Item = &'a Camera>, least_dete
 /// `None` where the mean of `I − d·dᵀ` has a determinant of no more than `least_determinant`, as for parallel lines.
 ///
 /// * `lines`: each a point `c` and a direction `d` of length 1.
-pub fn nearest_to_lines(lines: impl Iterator<Item = (DVec3, DVec3)>, least_determinant: f64) -> Option<DVec3> {
+pub(crate) fn nearest_to_lines(lines: impl Iterator<Item = (DVec3, DVec3)>, least_determinant: f64) -> Option<DVec3> {
     let (mut n, mut across_sum, mut across_centres) = (0, DMat3::ZERO, DVec3::ZERO);
     for (centre, axis) in lines {
         let across = DMat3::IDENTITY - DMat3::from_cols(axis * axis.x, axis * axis.y, axis * axis.z);

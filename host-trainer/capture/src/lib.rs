@@ -1,7 +1,6 @@
 //! Captures: photographs with poses, read from disk or drawn, in one normalised frame.
 //!
-//! [`dataset`] reads the layouts of Blender, COLMAP, nerfstudio, Polycam, Record3D and NSVF; [`synth`] writes a procedural capture; both give views with
-//! a [`camera`].
+//! [`dataset`] reads captures of every [`Layout`](dataset::Layout); [`synth`] writes a procedural one; both give views with a [`camera`].
 
 pub mod camera;
 pub mod dataset;

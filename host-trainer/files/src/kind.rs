@@ -108,9 +108,7 @@ impl FileKind {
     /// # Errors
     /// What the system said.
     pub fn of_file(path: &Path) -> io::Result<Option<Self>> {
-        let mut first = Vec::with_capacity(N_FIRST);
-        File::open(path)?.take(N_FIRST as u64).read_to_end(&mut first)?;
-        Ok(Self::of(&first))
+        Ok(Self::of(&first_bytes(path)?))
     }
 
     /// The bytes of the file at `path`; where the first ones say that nobody wants it, as a film of many gigabytes, these alone. What is
@@ -120,8 +118,7 @@ impl FileKind {
     /// What the system said.
     pub fn read(path: &Path, is_wanted: impl Fn(Option<Self>) -> bool) -> io::Result<Vec<u8>> {
         if path.is_file() {
-            let mut first = Vec::with_capacity(N_FIRST);
-            File::open(path)?.take(N_FIRST as u64).read_to_end(&mut first)?;
+            let first = first_bytes(path)?;
             if !is_wanted(Self::of(&first)) {
                 return Ok(first);
             }
@@ -168,6 +165,12 @@ impl FileKind {
             _ => None,
         }
     }
+}
+
+fn first_bytes(path: &Path) -> io::Result<Vec<u8>> {
+    let mut first = Vec::with_capacity(N_FIRST);
+    File::open(path)?.take(N_FIRST as u64).read_to_end(&mut first)?;
+    Ok(first)
 }
 
 impl fmt::Display for FileKind {

@@ -85,6 +85,11 @@ impl GpuImage {
         Ok(made)
     }
 
+    /// Drops all photographs.
+    pub(super) fn forget_photographs(&mut self) {
+        (self.photographs, self.other) = (BTreeMap::new(), None);
+    }
+
     /// Uploads a photograph that is not there yet.
     fn keep(&mut self, view: &TargetView<'_, f32>) -> Result<(), GpuError> {
         match view.index {

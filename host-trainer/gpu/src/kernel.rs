@@ -44,7 +44,7 @@ pub struct Commands<'g> {
     pass: Option<wgpu::ComputePass<'static>>,
 }
 
-/// Workgroups along one axis that every adapter takes.
+/// Workgroups along one axis that every adapter takes; `groups.wgsl` has the same.
 const MAX_GROUPS: usize = 65_535;
 
 impl<'g> Commands<'g> {
@@ -99,5 +99,38 @@ impl<'g> Commands<'g> {
         self.pass = None;
         self.gpu.queue.submit([self.encoder.finish()]);
         self.gpu.check()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parity::gpu;
+    use crate::{Buffer, GROUPS};
+
+    const COUNT: &str = "
+        @group(0) @binding(0) var<storage, read_write> counts: array<atomic<u32>>;
+        var<immediate> n_groups: u32;
+
+        @compute @workgroup_size(1)
+        fn count(@builtin(workgroup_id) group: vec3<u32>) {
+            let i = group_of(group);
+            if i < n_groups {
+                atomicAdd(&counts[i], 1u);
+            }
+        }
+    ";
+
+    #[test]
+    fn each_workgroup_has_a_number_of_its_own() {
+        let Some(gpu) = gpu() else { return };
+        let kernel = Kernel::new(gpu, "numbers of workgroups", &[GROUPS, COUNT]);
+        for n_groups in [1, MAX_GROUPS, MAX_GROUPS + 1, 2 * MAX_GROUPS + 3] {
+            let counts = Buffer::<u32>::zeros(gpu, "counts", n_groups).expect("room");
+            let mut commands = Commands::new(gpu);
+            commands.run(&kernel, &(n_groups as u32), &[&counts], n_groups);
+            commands.submit().expect("runs");
+            assert!(counts.read(gpu).expect("runs").iter().all(|count| *count == 1), "{n_groups} workgroups");
+        }
     }
 }

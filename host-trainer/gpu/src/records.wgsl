@@ -1,4 +1,4 @@
-// The records of gpu/records.rs.
+// The records of the kernels crate, field by field.
 
 struct Gaussian {
     centre: array<f32, 3>,

@@ -132,6 +132,10 @@ impl StepDevice<f32> for GpuStep {
     fn resident(&mut self) -> &mut dyn Resident<f32> {
         self
     }
+
+    fn forget_photographs(&mut self) {
+        self.images.forget_photographs();
+    }
 }
 
 impl Resident<f32> for GpuStep {

@@ -14,7 +14,7 @@ use crate::scene::{ContextModel, ContextNetwork, Head, ModelShape};
 /// Bits of the fraction of an input: [`pocketsplat_format::context::FEATURE_ONE`].
 const INPUT_BITS: i32 = 14;
 /// Bits of the fraction of a hidden unit, which reaches up to 32.
-pub const HIDDEN_BITS: i32 = 10;
+const HIDDEN_BITS: i32 = 10;
 /// Finest scale of a weight; beyond it every weight of the row would be below 0.008.
 const MAX_WEIGHT_BITS: i32 = 13;
 /// Coarsest: the shift by [`HIDDEN_BITS`] less the output's fraction bits, 6 at most, must not become negative.

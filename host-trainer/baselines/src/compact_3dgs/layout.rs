@@ -19,7 +19,7 @@ use super::quantised::Quantised;
 use super::residual_codes::{CODES, ResidualCodes, STAGES};
 use crate::baseline::Unreadable;
 use crate::bytes::{Bytes, put_range, range};
-use crate::packed::{Body, Mark, opened, put_rows, sealed};
+use crate::packed::{Body, Mark, all_below, opened, put_count, put_rows, sealed};
 
 const MARK: Mark = *b"PC31";
 
@@ -40,7 +40,7 @@ fn body(quantised: &Quantised) -> Vec<u8> {
     let Quantised { centres, opacity_logits, log_scales, rotations, log2_rows, rows, weights } = quantised;
     let mut body = Vec::new();
     for count in [centres.len(), log_scales.books[0].len(), rotations.books[0].len()] {
-        body.extend(u32::try_from(count).expect("fewer than 2³² Gaussians").to_le_bytes());
+        put_count(count, &mut body);
     }
     body.push(*log2_rows);
     put_range(opacity_logits, &mut body);
@@ -64,8 +64,7 @@ fn put_codes<const WIDTH: usize>(codes: &ResidualCodes<WIDTH>, body: &mut Vec<u8
 fn of_body(bytes: &[u8]) -> Result<Quantised, Unreadable> {
     let mut body = Body(bytes);
     let n = body.n_gaussians()?;
-    let mut count = |what| Ok::<_, Unreadable>(u32::from_le_bytes(body.four(what)?) as usize);
-    let [n_scales, n_rotations] = [count("the number of codes")?, count("the number of codes")?];
+    let [n_scales, n_rotations] = [body.count("the number of codes")?, body.count("the number of codes")?];
     let log2_rows = body.bytes(1, "the size of the grid")?[0];
     if log2_rows > MOST_LOG2_ROWS {
         return Err(Unreadable(format!(
@@ -101,9 +100,7 @@ fn codes<const WIDTH: usize>(
         let rows = body.rows::<WIDTH>(n_codes, "a codebook")?;
         *book = rows.into_iter().map(|code| code.map(f16::to_f32)).collect();
         let column = body.bytes(n, "codes")?;
-        if let Some(code) = column.iter().find(|code| usize::from(**code) >= n_codes) {
-            return Err(Unreadable(format!("a code is {code}, needed: less than {n_codes}; write the file again")));
-        }
+        all_below(column.iter().copied(), n_codes, "a code")?;
         codes.iter_mut().zip(column).for_each(|(codes, code)| codes[stage] = *code);
     }
     Ok(ResidualCodes { books, codes })

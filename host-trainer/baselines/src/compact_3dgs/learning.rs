@@ -106,19 +106,13 @@ mod tests {
 
     use super::*;
     use crate::baseline::TrainedScene;
-    use crate::test_scenes::{capture_of, gaussians, short_config};
+    use crate::test_scenes::{capture_of, gaussians, short_config, with_hidden};
 
     #[test]
     fn the_field_learns_the_colours_and_what_does_not_show_goes() {
-        let mut before = gaussians(60);
+        let before = gaussians(60);
         let capture = capture_of(&before, 4);
-        // As many again that do not show.
-        let hidden = gaussians(60);
-        before.centres.extend(&hidden.centres);
-        before.log_scales.extend(&hidden.log_scales);
-        before.rotations.extend(&hidden.rotations);
-        before.opacity_logits.extend([-9.0; 60]);
-        before.harmonics.extend(&hidden.harmonics);
+        let before = with_hidden(&before);
         let mut config = short_config();
         config.iterations = 6000;
         let scene = TrainedScene { gaussians: &before, capture: &capture, config: &config };

@@ -14,7 +14,7 @@
 use super::quantisation::{COLOUR, Quantised, SHAPE};
 use crate::baseline::Unreadable;
 use crate::octree;
-use crate::packed::{Body, Mark, opened, put_bits, put_rows, put_words, sealed};
+use crate::packed::{Body, Mark, all_below, opened, put_bits, put_count, put_rows, put_words, sealed};
 use crate::voxels::Lattice;
 
 const MARK: Mark = *b"PLG1";
@@ -33,7 +33,7 @@ fn body(quantised: &Quantised) -> Vec<u8> {
     let Quantised { lattice, voxels, shapes, code_of, codebook, kept } = quantised;
     let mut body = Vec::new();
     for count in [voxels.len(), codebook.len()] {
-        body.extend(u32::try_from(count).expect("fewer than 2³² Gaussians").to_le_bytes());
+        put_count(count, &mut body);
     }
     let [x, y, z] = lattice.corner;
     [x, y, z, lattice.voxel].iter().for_each(|number| body.extend(number.to_le_bytes()));
@@ -53,8 +53,8 @@ fn body(quantised: &Quantised) -> Vec<u8> {
 fn of_body(bytes: &[u8]) -> Result<Quantised, Unreadable> {
     let mut body = Body(bytes);
     let n = body.n_gaussians()?;
-    let n_codes = u32::from_le_bytes(body.four("the number of codes")?) as usize;
-    let mut number = || Ok::<_, Unreadable>(f32::from_le_bytes(body.four("the lattice")?));
+    let n_codes = body.count("the number of codes")?;
+    let mut number = || body.number("the lattice");
     let (corner, voxel) = ([number()?, number()?, number()?], number()?);
     let far = corner.map(|number| number + voxel * (1 << octree::DEPTH) as f32);
     if !(voxel > 0.0 && corner.iter().chain(&far).all(|number| number.is_finite())) {
@@ -78,9 +78,7 @@ fn of_body(bytes: &[u8]) -> Result<Quantised, Unreadable> {
     let is_coded = body.bits(n, "who has a code")?;
     let n_coded = is_coded.iter().filter(|coded| **coded).count();
     let codes = body.words(n_coded, "codes")?;
-    if let Some(code) = codes.iter().find(|code| usize::from(**code) >= n_codes) {
-        return Err(Unreadable(format!("a code is {code}, needed: less than {n_codes}; write the file again")));
-    }
+    all_below(codes.iter().copied(), n_codes, "a code")?;
     let mut next = codes.into_iter();
     let code_of = is_coded.iter().map(|coded| coded.then(|| next.next()).flatten()).collect();
     let codebook = body.rows::<COLOUR>(n_codes, "the codebook")?;

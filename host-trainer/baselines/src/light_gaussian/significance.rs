@@ -1,7 +1,6 @@
 //! How much a Gaussian gives the training views.
 
 use pocketsplat_kernels::ops::Pinhole;
-use pocketsplat_kernels::ops::image::rasterise::TiledImage;
 use pocketsplat_kernels::ops::simd::Level;
 use pocketsplat_trainer::explicit::Cloud;
 use pocketsplat_trainer::explicit::step::draw;
@@ -19,10 +18,8 @@ const FULL_VOLUME_SHARE: f64 = 0.9;
 pub(crate) fn significance(level: Level, cloud: &Cloud<f32>, cameras: &[Pinhole<f32>]) -> Vec<f64> {
     let mut light = vec![0.0; cloud.len()];
     for camera in cameras {
-        let [width, height] = camera.size_px;
         let drawing = draw(level, cloud, camera, [0.0; 3]);
-        let ones = TiledImage::from_planes(&vec![1.0; 3 * width * height], camera.size_px);
-        for (index, given) in drawing.drawn.iter().zip(drawing.light(level, &ones)) {
+        for (index, given) in drawing.drawn.iter().zip(drawing.light(level, camera.size_px)) {
             light[*index as usize] += f64::from(given);
         }
     }

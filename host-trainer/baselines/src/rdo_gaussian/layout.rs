@@ -21,7 +21,7 @@ use super::quantised::{Codes, Quantised};
 use super::symbols::{frequencies_of, put_symbols, symbols};
 use crate::baseline::Unreadable;
 use crate::bytes::{Bytes, put_range, range};
-use crate::packed::{Body, Mark, opened, put_rows, sealed};
+use crate::packed::{Body, Mark, all_below, opened, put_count, put_rows, sealed};
 
 const MARK: Mark = *b"PRD1";
 
@@ -36,7 +36,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Quantised, Unreadable> {
 }
 
 fn body(Quantised { degree, centres, opacity_logits, attributes }: &Quantised) -> Vec<u8> {
-    let mut body = u32::try_from(centres.len()).expect("fewer than 2³² Gaussians").to_le_bytes().to_vec();
+    let mut body = Vec::new();
+    put_count(centres.len(), &mut body);
     body.extend(u8::try_from(degree.number()));
     put_range(opacity_logits, &mut body);
     put_rows(centres, &mut body);
@@ -70,8 +71,10 @@ fn of_body(bytes: &[u8]) -> Result<Quantised, Unreadable> {
     };
     let [least, step] = range(&mut body)?;
     let centres = body.rows::<3>(n, "centres")?;
-    let opacities = small(symbols(&mut body, n, "opacities")?.1, 256, "an opacity")?;
-    let degrees = small(symbols(&mut body, n, "degrees")?.1, 1 << number, "a set of degrees")?;
+    let (_, opacities) = symbols(&mut body, n, "opacities")?;
+    all_below(opacities.iter().copied(), 256, "an opacity")?;
+    let (_, degrees) = symbols(&mut body, n, "degrees")?;
+    all_below(degrees.iter().copied(), 1 << number, "a set of degrees")?;
     let bytes = opacities.into_iter().map(|opacity| opacity.to_le_bytes()[0]).collect();
     let mut attributes = Vec::new();
     for attribute in 0..n_attributes(degree) {
@@ -91,14 +94,6 @@ fn of_body(bytes: &[u8]) -> Result<Quantised, Unreadable> {
     }
     body.end()?;
     Ok(Quantised { degree, centres, opacity_logits: Bytes { least, step, bytes }, attributes })
-}
-
-/// Symbols, all below a bound.
-fn small(symbols: Vec<u16>, bound: u16, what: &str) -> Result<Vec<u16>, Unreadable> {
-    if let Some(symbol) = symbols.iter().find(|symbol| **symbol >= bound) {
-        return Err(Unreadable(format!("{what} is {symbol}, needed: less than {bound}; write the file again")));
-    }
-    Ok(symbols)
 }
 
 #[cfg(test)]

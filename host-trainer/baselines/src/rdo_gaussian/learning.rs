@@ -173,7 +173,7 @@ mod tests {
 
     use super::*;
     use crate::baseline::TrainedScene;
-    use crate::test_scenes::{capture_of, gaussians, short_config};
+    use crate::test_scenes::{capture_of, gaussians, short_config, with_hidden};
 
     #[test]
     fn the_gradients_of_the_rate_by_masks_agree_with_finite_differences() {
@@ -196,13 +196,7 @@ mod tests {
         // Nothing depends on the direction.
         before.harmonics.chunks_mut(16).for_each(|harmonics| harmonics[1..].fill([0.0; 3]));
         let capture = capture_of(&before, 4);
-        // As many again that do not show.
-        let hidden = before.clone();
-        before.centres.extend(&hidden.centres);
-        before.log_scales.extend(&hidden.log_scales);
-        before.rotations.extend(&hidden.rotations);
-        before.opacity_logits.extend([-9.0; 60]);
-        before.harmonics.extend(&hidden.harmonics);
+        let before = with_hidden(&before);
         let mut config = short_config();
         config.iterations = 200;
         let scene = TrainedScene { gaussians: &before, capture: &capture, config: &config };

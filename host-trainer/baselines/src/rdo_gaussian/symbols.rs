@@ -4,7 +4,7 @@ use pocketsplat_codec::bundle::{SlotList, frequencies};
 use pocketsplat_format::entropy::{AnsReader, FREQUENCY_TOTAL, Slot, SymbolModel};
 
 use crate::baseline::Unreadable;
-use crate::packed::{Body, put_words};
+use crate::packed::{Body, put_count, put_words};
 
 /// Frequencies of symbols, which fill the slots of the coder.
 struct Table {
@@ -55,7 +55,7 @@ pub(super) fn put_symbols(symbols: &[u16], frequencies: &[u16], body: &mut Vec<u
     symbols.iter().for_each(|symbol| slots.append(&table.slot_of(*symbol)));
     let words = slots.into_bytes();
     for count in [frequencies.len(), words.len() / 2] {
-        body.extend(u32::try_from(count).expect("fewer than 2³² words").to_le_bytes());
+        put_count(count, body);
     }
     put_words(frequencies.iter().copied(), body);
     body.extend(words);
@@ -66,8 +66,7 @@ pub(super) fn put_symbols(symbols: &[u16], frequencies: &[u16], body: &mut Vec<u
 /// # Errors
 /// Bytes that end early, frequencies that do not fill the slots, and a stream that has not `n` symbols. Memory: `n` of them.
 pub(super) fn symbols(body: &mut Body<'_>, n: usize, what: &str) -> Result<(Vec<u16>, Vec<u16>), Unreadable> {
-    let mut count = || Ok::<_, Unreadable>(u32::from_le_bytes(body.four(what)?) as usize);
-    let [n_frequencies, n_words] = [count()?, count()?];
+    let [n_frequencies, n_words] = [body.count(what)?, body.count(what)?];
     let frequencies = body.words(n_frequencies, what)?;
     let needed = if n > 0 { u64::from(FREQUENCY_TOTAL) } else { 0 };
     let total: u64 = frequencies.iter().copied().map(u64::from).sum();

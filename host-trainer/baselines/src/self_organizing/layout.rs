@@ -19,7 +19,7 @@ use pocketsplat_gaussians::Degree;
 use super::attributes::{CENTRE, COLOUR, LOG_SCALE, OPACITY, ROTATION, bands};
 use super::quantisation::{Quantised, most};
 use crate::baseline::Unreadable;
-use crate::packed::{Body, Mark, opened, sealed};
+use crate::packed::{Body, Mark, opened, put_count, sealed};
 
 const MARK: Mark = *b"PSO1";
 
@@ -53,14 +53,14 @@ pub(super) fn read(bytes: &[u8]) -> Result<Quantised, Unreadable> {
 }
 
 fn body(Quantised { side, degree, ranges, planes }: &Quantised) -> Vec<u8> {
-    let four = |n: usize| u32::try_from(n).expect("fewer than 2³² bytes").to_le_bytes();
-    let mut body = four(*side).to_vec();
+    let mut body = Vec::new();
+    put_count(*side, &mut body);
     body.extend(u8::try_from(degree.number()));
     ranges.as_flattened().iter().for_each(|bound| body.extend(bound.to_le_bytes()));
     for (of, shift) in images(*degree) {
         let rows: Vec<u8> = planes[of].iter().flatten().map(|step| (step >> shift).to_le_bytes()[0]).collect();
         let png = if rows.is_empty() { Vec::new() } else { png(&rows, *side) };
-        body.extend(four(png.len()));
+        put_count(png.len(), &mut body);
         body.extend(png);
     }
     body
@@ -68,12 +68,12 @@ fn body(Quantised { side, degree, ranges, planes }: &Quantised) -> Vec<u8> {
 
 fn of_body(bytes: &[u8]) -> Result<Quantised, Unreadable> {
     let mut body = Body(bytes);
-    let side = u32::from_le_bytes(body.four("the side of the grid")?) as usize;
+    let side = body.count("the side of the grid")?;
     let number = usize::from(body.bytes(1, "the degree")?[0]);
     let Some(degree) = Degree::ALL.get(number).copied() else {
         return Err(Unreadable(format!("the degree is {number}, needed: 0 to 3; write the file again")));
     };
-    let mut bound = || Ok::<_, Unreadable>(f32::from_le_bytes(body.four("ranges")?));
+    let mut bound = || body.number("ranges");
     let n_planes = bands(degree).end;
     let ranges = (0..n_planes).map(|_| Ok([bound()?, bound()?])).collect::<Result<Vec<_>, _>>()?;
     let faulty = |(of, range): &(usize, &[f32; 2])| {
@@ -87,7 +87,7 @@ fn of_body(bytes: &[u8]) -> Result<Quantised, Unreadable> {
     }
     let mut planes = vec![Vec::new(); n_planes];
     for (of, shift) in images(degree) {
-        let n = u32::from_le_bytes(body.four("the length of an image")?) as usize;
+        let n = body.count("the length of an image")?;
         let image = body.bytes(n, "an image")?;
         let pixels = if side == 0 || of.is_empty() { Vec::new() } else { pixels(image, side, of.len())? };
         for (plane, part) in of.zip(pixels.chunks(side.max(1) * side.max(1))) {

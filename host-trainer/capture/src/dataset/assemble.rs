@@ -31,11 +31,20 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
     let n_with_alpha = shots().count() - n_without_alpha;
     let listed = listing.n_listed(Split::Train);
     let held_out = listing.n_held_out_by(options.test_every);
+    let too_few_views = |path, usable, faults| DatasetError::TooFewViews {
+        path,
+        usable,
+        listed,
+        held_out,
+        needed: MIN_TRAIN_VIEWS,
+        faults,
+    };
     // Before decoding anything, if what is known does not do.
-    if listing.shots(Split::Train).count() < MIN_TRAIN_VIEWS {
+    let usable = listing.shots(Split::Train).count();
+    if usable < MIN_TRAIN_VIEWS {
         let faults = listing.views.iter().filter(|view| view.split == Split::Train);
         let faults = faults.filter_map(|view| Some(format!("{}: {}", view.name, view.shot.as_ref().err()?)));
-        return Err(too_few_views(&listing, listed, held_out, faults.collect()));
+        return Err(too_few_views(listing.source.clone(), usable, faults.collect()));
     }
     frame(listing.shots(Split::Train).map(Shot::centre_world), &listing.source)?;
     let mut warnings = doubts(&listing, options);
@@ -51,14 +60,7 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
     skipped.sort_by_key(|view| view.split);
     if train.len() < MIN_TRAIN_VIEWS {
         let faults = skipped.iter().filter(|view| view.split == Split::Train).map(ToString::to_string).collect();
-        return Err(DatasetError::TooFewViews {
-            path: source,
-            usable: train.len(),
-            listed,
-            held_out,
-            needed: MIN_TRAIN_VIEWS,
-            faults,
-        });
+        return Err(too_few_views(source, train.len(), faults));
     }
     let normalisation = frame(train.iter().map(|view| view.camera.centre_world()), &source)?;
     for view in train.iter_mut().chain(&mut test) {
@@ -197,16 +199,4 @@ fn decoded(views: Vec<ListedView>, options: &LoadOptions) -> Result<Decoded, Dat
 fn frame(centres: impl Iterator<Item = DVec3>, source: &Path) -> Result<Normalisation, DatasetError> {
     let no_baseline = |spread| DatasetError::NoBaseline { path: source.to_owned(), spread };
     Normalisation::of_cameras(&centres.collect::<Vec<_>>()).map_err(no_baseline)
-}
-
-fn too_few_views(listing: &Listing, listed: usize, held_out: usize, faults: Vec<String>) -> DatasetError {
-    let usable = listing.shots(Split::Train).count();
-    DatasetError::TooFewViews {
-        path: listing.source.clone(),
-        usable,
-        listed,
-        held_out,
-        needed: MIN_TRAIN_VIEWS,
-        faults,
-    }
 }

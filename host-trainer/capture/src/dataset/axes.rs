@@ -1,10 +1,8 @@
 //! Whether cameras without points look at what they surround: poses in other axes than they are read in look away from it.
 
 use super::listing::{Listing, Note, Shot};
-use crate::camera::{Camera, nearest_to_axes};
+use crate::camera::{Camera, MIN_DETERMINANT, nearest_to_axes};
 
-/// The axes fix a point where the mean projector across them has at least this determinant; axes from all sides give (2/3)³.
-const MIN_DETERMINANT: f64 = 1e-3;
 /// The axes meet where they pass the point at no more than this part of the cameras' distance from it, in the mean.
 const MAX_MISS: f64 = 0.5;
 

@@ -39,8 +39,7 @@ pub(super) fn is_layout_of(folder: &Path) -> bool {
 /// As [`super::load`], as far as files but no pixels tell.
 pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, DatasetError> {
     let Some((path, list)) = files(folder) else { return Err(DatasetError::NotAFolder { path: folder.to_owned() }) };
-    let read = |path: &Path| text_file::read(path).map_err(|source| DatasetError::of_reading(path, source));
-    let (text, list) = (read(&path)?, read(&list)?);
+    let (text, list) = (text_file::read(&path)?, text_file::read(&list)?);
     // Behind a name stand a zero and a focal length where Bundler's scripts wrote the list.
     let names = list.lines().map(str::trim).filter(|line| !line.is_empty());
     let names: Vec<&str> = names.map(without_focal).collect();
@@ -58,9 +57,7 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     frames.sort_by(|a, b| a.name().cmp(b.name()));
     let split = |i| Some(every_nth(options.test_every, i));
     let points = Some((path.clone(), points)).filter(|(_, points)| !points.is_empty());
-    let mut listing = list_frames(Layout::Bundler, path, &images, &frames, &Intrinsics::default(), points, split);
-    listing.notes.extend(notes);
-    Ok(listing)
+    Ok(list_frames(Layout::Bundler, path, &images, &frames, points, notes, split))
 }
 
 /// A line of the list without the zero and the focal length at its end.
@@ -86,10 +83,8 @@ impl Camera {
         // By columns, so this is the rotation from camera to world.
         let to_world = DMat3::from_cols_array(&self.rotation);
         let centre = -(to_world * DVec3::from_array(self.translation));
-        let rows: Vec<Vec<f64>> =
-            (0..3).map(|i| to_world.row(i).to_array().into_iter().chain([centre[i]]).collect()).collect();
         let [fl_x, k1, k2] = self.lens.map(Some);
-        Frame::new(name.to_owned(), &rows, Intrinsics { fl_x, k1, k2, ..Intrinsics::default() })
+        Frame::of_pose(name.to_owned(), to_world, centre, Intrinsics { fl_x, k1, k2, ..Intrinsics::default() })
     }
 }
 

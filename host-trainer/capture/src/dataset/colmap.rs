@@ -59,11 +59,8 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
         notes.push(Note::no_points(&format!("`{}` {why}", shown(&points_path))));
     }
     let image_folder = match of_model.filter(|_| options.images.is_none()) {
-        Some(name) => Some(name.to_owned()),
-        None => image_folder::choose(&root, options, &mut notes)?,
-    };
-    let Some(image_folder) = image_folder.map(|name| root.join(name)) else {
-        return Err(DatasetError::ImageFolder { path: root, wanted: None, present: Vec::new() });
+        Some(name) => root.join(name),
+        None => image_folder::needed(&root, options, &mut notes)?,
     };
     let masks = Some(root.join(MASKS)).filter(|masks| masks.is_dir());
     let names = FolderNames::default();
@@ -79,13 +76,9 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
         .collect();
     let posed: Vec<PathBuf> =
         images.iter().filter_map(|image| NamedPath::new(&image.name).image(&names, &image_folder, None)).collect();
-    let used_masks: Vec<PathBuf> = views
-        .iter()
-        .filter_map(|view| view.shot.as_ref().ok())
-        .flat_map(|shot| shot.masks.iter().map(|mask| mask.path.clone()))
-        .collect();
+    let used_masks = views.iter().flat_map(|view| &view.shot).flat_map(|shot| &shot.masks).map(|mask| &mask.path);
+    let unposed = unused_images(&image_folder, posed.iter().chain(used_masks).map(PathBuf::as_path));
     notes.extend(found_files::check(&mut views, &names));
-    let unposed = unused_images(&image_folder, posed.iter().chain(&used_masks).map(PathBuf::as_path));
     notes.extend(missing_masks(masks.as_deref(), &views));
     notes
         .extend(long_quaternions(&path("images"), images.iter().map(|image| (image.name.as_str(), quaternion(image)))));
@@ -103,12 +96,26 @@ fn read<T>(
     binary: fn(&[u8]) -> Result<T, ModelFault>,
     text: fn(&str) -> Result<T, ModelFault>,
 ) -> Result<T, DatasetError> {
-    let cannot_read = |source| DatasetError::of_reading(path, source);
     let parsed = match encoding {
-        ModelEncoding::Binary => binary(&std::fs::read(path).map_err(cannot_read)?),
-        ModelEncoding::Text => text(&text_file::read(path).map_err(cannot_read)?),
+        ModelEncoding::Binary => binary(&std::fs::read(path).map_err(|source| DatasetError::of_reading(path, source))?),
+        ModelEncoding::Text => text(&text_file::read(path)?),
     };
     parsed.map_err(|fault| DatasetError::of_model(path, fault.place, fault.found))
+}
+
+/// The names of the images with a pose in the bytes of `images.bin`; `None` where these are damaged.
+pub fn colmap_posed_names(images: &[u8]) -> Option<Vec<String>> {
+    Some(binary::images(images).ok()?.into_iter().map(|image| image.name).collect())
+}
+
+/// The errors of reprojection, pixels, of the points in the bytes of `points3D.bin`; `None` where these are damaged.
+pub fn colmap_reprojection_errors_px(points: &[u8]) -> Option<Vec<f64>> {
+    Some(binary::points_with_errors(points).ok()?.into_iter().map(|(.., error_px)| error_px).collect())
+}
+
+/// `[fx, fy]`, pixels, of each camera in the bytes of `cameras.bin`; `None` where these are damaged or a camera's model is not read.
+pub fn colmap_focal_lengths_px(cameras: &[u8]) -> Option<Vec<[f64; 2]>> {
+    binary::cameras(cameras).ok()?.into_values().map(|camera| Some(camera.lens?.focal_px)).collect()
 }
 
 /// Says how many views lack a mask although others have one.
@@ -148,10 +155,7 @@ fn shot(
     let path = NamedPath::new(&image.name)
         .image(names, folder, None)
         .ok_or_else(|| ViewFault::of_missing(folder.join(&image.name), "the model"))?;
-    let header = match read_header(&path) {
-        Ok(header) => header,
-        Err(message) => return Err(ViewFault::of_header(path, message)),
-    };
+    let header = read_header(&path).map_err(|message| ViewFault::of_header(&path, message))?;
     let Some(lens) = &camera.lens else {
         return Err(ViewFault::CameraModel { model: camera.model.clone() });
     };

@@ -4,44 +4,49 @@ use std::path::{Path, PathBuf};
 
 use pocketsplat_files::{closed_folder, shown};
 
+use super::listing::Listing;
 use super::{
-    DatasetError, Layout, blender, bundler, colmap, llff, metashape, nerfstudio, no_poses, nsvf, opensfm, polycam,
-    realitycapture, record3d,
+    DatasetError, Layout, LoadOptions, blender, bundler, colmap, llff, metashape, nerfstudio, no_poses, nsvf, opensfm,
+    polycam, realitycapture, record3d,
 };
 
 /// How far below a capture's folder the folders of its layout lie, as `sparse/0`.
 const DEPTH: u32 = 2;
 
+/// What reads the captures of a layout.
+pub(super) struct Reader {
+    layout: Layout,
+    /// Whether a folder is of the layout, told by the files in it.
+    fits: fn(&Path) -> bool,
+    /// Lists the capture in a folder of the layout.
+    pub(super) list: fn(&Path, &LoadOptions) -> Result<Listing, DatasetError>,
+}
+
+/// The readers, in the order in which they are asked.
+const READERS: [Reader; 12] = [
+    Reader { layout: Layout::Blender, fits: |path| path.join(blender::TRAIN_FILE).is_file(), list: blender::list },
+    Reader { layout: Layout::Colmap, fits: |path| colmap::has_model(path, true), list: colmap::list },
+    Reader { layout: Layout::Nerfstudio, fits: |path| path.join(nerfstudio::FILE).is_file(), list: nerfstudio::list },
+    // After nerfstudio, which leaves the model in `colmap/sparse` that its transforms were made from.
+    Reader { layout: Layout::Colmap, fits: |path| colmap::has_model(path, false), list: colmap::list },
+    Reader { layout: Layout::Polycam, fits: polycam::is_layout_of, list: polycam::list },
+    Reader { layout: Layout::Record3d, fits: record3d::is_layout_of, list: record3d::list },
+    Reader { layout: Layout::Nsvf, fits: nsvf::is_layout_of, list: nsvf::list },
+    Reader { layout: Layout::OpenSfm, fits: opensfm::is_layout_of, list: opensfm::list },
+    Reader { layout: Layout::Bundler, fits: bundler::is_layout_of, list: bundler::list },
+    Reader { layout: Layout::Metashape, fits: metashape::is_layout_of, list: metashape::list },
+    Reader { layout: Layout::RealityCapture, fits: realitycapture::is_layout_of, list: realitycapture::list },
+    Reader { layout: Layout::Llff, fits: llff::is_layout_of, list: llff::list },
+];
+
+/// The reader of the folder `path`; none where it is no capture.
+pub(super) fn reader_of(path: &Path) -> Option<Reader> {
+    READERS.into_iter().find(|reader| (reader.fits)(path))
+}
+
 /// The layout of the folder `path`, told by the files in it; none where it is no capture.
 pub fn layout_of(path: &Path) -> Option<Layout> {
-    if path.join(blender::TRAIN_FILE).is_file() {
-        Some(Layout::Blender)
-    } else if colmap::has_model(path, true) {
-        Some(Layout::Colmap)
-    } else if path.join(nerfstudio::FILE).is_file() {
-        Some(Layout::Nerfstudio)
-    } else if colmap::has_model(path, false) {
-        // After nerfstudio, which leaves the model in `colmap/sparse` that its transforms were made from.
-        Some(Layout::Colmap)
-    } else if polycam::is_layout_of(path) {
-        Some(Layout::Polycam)
-    } else if record3d::is_layout_of(path) {
-        Some(Layout::Record3d)
-    } else if nsvf::is_layout_of(path) {
-        Some(Layout::Nsvf)
-    } else if opensfm::is_layout_of(path) {
-        Some(Layout::OpenSfm)
-    } else if bundler::is_layout_of(path) {
-        Some(Layout::Bundler)
-    } else if metashape::is_layout_of(path) {
-        Some(Layout::Metashape)
-    } else if realitycapture::is_layout_of(path) {
-        Some(Layout::RealityCapture)
-    } else if llff::is_layout_of(path) {
-        Some(Layout::Llff)
-    } else {
-        None
-    }
+    reader_of(path).map(|reader| reader.layout)
 }
 
 /// The capture that a folder is a part of, such as of its `images` or `sparse/0`.

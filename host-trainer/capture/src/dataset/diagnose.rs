@@ -73,10 +73,9 @@ pub fn diagnose(path: &Path, options: &LoadOptions) -> Diagnosis {
     // Stable, so that findings of one severity keep the order of the checks.
     findings.sort_by_key(|finding| finding.severity);
     diagnosis.findings = findings;
-    let n_points = |listing: &Listing| listing.points.as_ref().map_or(0, |(_, points)| points.len());
     diagnosis.n_train = listing.shots(Split::Train).count();
     diagnosis.n_test = listing.shots(Split::Test).count();
-    diagnosis.n_points = n_points(&listing);
+    diagnosis.n_points = listing.points.as_ref().map_or(0, |(_, points)| points.len());
     diagnosis
 }
 

@@ -48,7 +48,7 @@ pub enum DatasetError {
         shown(path), instead(path, *kind)
     )]
     Transforms { path: PathBuf, source: serde_json::Error, kind: Option<FileKind> },
-    /// A file of a telephone's export is no such JSON; the source gives line and column.
+    /// A file of another program's export is no such JSON; the source gives line and column.
     #[error(
         "`{}` is not {what}: {source}; it needs {needs}: export the capture again{}",
         shown(path), instead(path, *kind)
@@ -139,12 +139,14 @@ pub enum DatasetError {
 }
 
 impl DatasetError {
-    /// Of a file of text that could not be read.
+    /// Of a file that the system does not let be read.
     pub(super) fn of_reading(path: &Path, source: std::io::Error) -> Self {
+        Self::Read { path: path.to_owned(), source }
+    }
+
+    /// Of a file of text that is none.
+    pub(super) fn of_no_text(path: &Path) -> Self {
         let path = path.to_owned();
-        if source.kind() != std::io::ErrorKind::InvalidData {
-            return Self::Read { path, source };
-        }
         match kind_of(&path) {
             Some(kind) => Self::OtherKind { path, needed: "a file of text", code: "unreadable-file", kind },
             None => Self::NotText { path },
@@ -156,7 +158,7 @@ impl DatasetError {
         Self::Transforms { path: path.to_owned(), source, kind: kind_of(path) }
     }
 
-    /// Of a file of a telephone's export that is none.
+    /// Of a file of another program's export that is none.
     pub(super) fn of_json(path: &Path, what: &'static str, needs: &'static str, source: serde_json::Error) -> Self {
         Self::Json { path: path.to_owned(), what, needs, source, kind: kind_of(path) }
     }

@@ -1,11 +1,11 @@
 //! Random initial points where the cameras look, for captures that bring no points.
 
 use glam::DVec3;
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
 
+use super::apart::quantile;
+use super::normalise::unit_numbers;
 use super::{EXTENT, SceneKind};
-use crate::camera::{Camera, nearest_to_axes};
+use crate::camera::{Camera, MIN_DETERMINANT, nearest_to_axes};
 
 /// Half the side of the cube of points, in half-widths of the cameras' view at the focus.
 ///
@@ -17,9 +17,6 @@ const FAR_DISTANCES: f64 = 4.0;
 const NEAR_DISTANCES: f64 = 0.25;
 /// Cameras look at a cube where theirs is at least so much of it, and at most the inverse.
 const LIKE_CUBE: f64 = 0.5;
-/// The focus is taken where the mean projector across the optical axes has at least this determinant; parallel axes
-/// give 0, axes from all sides (2/3)³.
-const MIN_DETERMINANT: f64 = 1e-3;
 
 /// `n` points of the volume that the cameras see, in their frame; the same for the same seed on every machine.
 ///
@@ -31,9 +28,7 @@ const MIN_DETERMINANT: f64 = 1e-3;
 ///
 /// * `cameras`: normalised, at least one.
 pub(super) fn random_points(cameras: &[&Camera], kind: SceneKind, n: usize, seed: u64) -> Vec<DVec3> {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    // The upper 53 bits, the precision of f64, as a fraction of 1.
-    let mut unit = move || (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+    let mut unit = unit_numbers(seed);
     let focus = focus(cameras);
     let cube = focus.map(|focus| (focus, cube_half(cameras, focus)));
     (0..n)
@@ -96,9 +91,7 @@ fn cube_half(cameras: &[&Camera], focus: DVec3) -> f64 {
             (f64::from(camera.width_px) / camera.focal_px[0]).min(f64::from(camera.height_px) / camera.focal_px[1]);
         0.5 * across * depth(camera, focus)
     };
-    let mut halves: Vec<f64> = cameras.iter().map(half_width).collect();
-    halves.sort_by(f64::total_cmp);
-    CUBE_HALF_WIDTHS * halves[halves.len() / 2]
+    CUBE_HALF_WIDTHS * quantile(cameras.iter().map(half_width), 0.5)
 }
 
 #[cfg(test)]

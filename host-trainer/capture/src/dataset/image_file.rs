@@ -11,7 +11,7 @@ use pocketsplat_files::FileKind;
 
 use super::folder_names::{Entry, FolderNames, Likeness, only_best};
 use super::image::read_header;
-use super::image_names::{EXTENSIONS, has_foreign_name, is_foreign, is_image_name};
+use super::image_names::{PHOTOGRAPH_EXTENSIONS, extension, has_foreign_name, is_foreign, is_image_name};
 
 /// Endings that photographs get, in the order in which they stand in for each other: a lossless file beside them is rather a map.
 const OF_PHOTOGRAPHS: [&str; 4] = ["jpg", "jpeg", "webp", "png"];
@@ -87,14 +87,13 @@ fn worth(path: &Path) -> Option<u8> {
 
 /// How far an ending is from the one that was named.
 fn place_of_ending(named: &str, found: &str) -> usize {
-    let ending = |name: &str| name.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase());
-    let (named, found) = (ending(named), ending(found).unwrap_or_default());
+    let (named, found) = (extension(named), extension(found).unwrap_or_default());
     if named.as_ref() == Some(&found) {
         return 0;
     }
     // A name without ending, as Blender's, means a PNG.
     let is_photograph = named.is_some_and(|named| named != "png");
-    let order = if is_photograph { OF_PHOTOGRAPHS } else { EXTENSIONS };
+    let order = if is_photograph { OF_PHOTOGRAPHS } else { PHOTOGRAPH_EXTENSIONS };
     1 + order.iter().position(|ending| *ending == found).unwrap_or(order.len())
 }
 

@@ -1,6 +1,6 @@
 //! Which folder of images to read: captures often hold the photographs at several sizes.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::image_names::is_image_name;
 use super::listing::{Note, is_hidden};
@@ -45,6 +45,17 @@ pub(super) fn choose(
             Ok(Some(FULL_SIZE.to_owned()))
         }
         _ => Err(DatasetError::ImageFolder { path: folder.to_owned(), wanted: None, present }),
+    }
+}
+
+/// The folder of [`choose`], which has to be there.
+///
+/// # Errors
+/// [`DatasetError::ImageFolder`], also where there is none.
+pub(super) fn needed(folder: &Path, options: &LoadOptions, notes: &mut Vec<Note>) -> Result<PathBuf, DatasetError> {
+    match choose(folder, options, notes)? {
+        Some(name) => Ok(folder.join(name)),
+        None => Err(DatasetError::ImageFolder { path: folder.to_owned(), wanted: None, present: Vec::new() }),
     }
 }
 

@@ -45,6 +45,9 @@ pub(super) struct Lens {
 /// Focal lengths of cameras without a fisheye, in the image's longer side: fields of view of 157 to 0.6 degrees.
 pub(super) const USUAL_FOCAL_LENGTHS: [f64; 2] = [0.1, 100.0];
 
+/// No lens has a skew: one that moves a pixel at the border by less than this many pixels is left out without a word.
+pub(super) const MAX_SKEW_PX: f64 = 0.5;
+
 impl Lens {
     /// A lens without distortion, its principal point in the middle.
     pub(super) fn central(size_px: (u32, u32), focal_px: [f64; 2]) -> Self {

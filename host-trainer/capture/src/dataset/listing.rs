@@ -155,9 +155,14 @@ pub(super) fn is_hidden(name: &OsStr) -> bool {
     name.as_encoded_bytes().starts_with(b".")
 }
 
-/// Whether a file of a folder of poses holds one: it has this extension and is not hidden.
-pub(super) fn is_listed(path: &Path, extension: &str) -> bool {
-    path.extension().is_some_and(|own| own == extension) && path.file_name().is_some_and(|name| !is_hidden(name))
+/// The files of a folder that have this extension and are not hidden, sorted.
+pub(super) fn files_with(folder: &Path, extension: &str) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let is_shown = |path: &PathBuf| path.file_name().is_some_and(|name| !is_hidden(name));
+    let is_of_extension = |path: &PathBuf| path.extension().is_some_and(|own| own == extension);
+    let mut files: Vec<PathBuf> = entries.filter(|path| is_of_extension(path) && is_shown(path)).collect();
+    files.sort();
+    files
 }
 
 /// Gives every `test_every`-th of `n` views, counted from the first, to the test split; none where it is 0.

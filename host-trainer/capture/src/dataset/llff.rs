@@ -30,9 +30,7 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     let fault = |found: String| DatasetError::of_model(&path, "array".to_owned(), found);
     let rows = rows(&bytes).map_err(fault)?;
     let mut notes = Vec::new();
-    let Some(images) = image_folder::choose(folder, options, &mut notes)?.map(|name| folder.join(name)) else {
-        return Err(DatasetError::ImageFolder { path: folder.to_owned(), wanted: None, present: Vec::new() });
-    };
+    let images = image_folder::needed(folder, options, &mut notes)?;
     let names = image_names(&images);
     if names.len() != rows.len() {
         return Err(fault(format!(
@@ -44,9 +42,7 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     }
     let frames: Vec<Frame> = names.into_iter().zip(&rows).map(|(name, row)| frame(name, row)).collect();
     let split = |i| Some(every_nth(options.test_every, i));
-    let mut listing = list_frames(Layout::Llff, path.clone(), &images, &frames, &Intrinsics::default(), None, split);
-    listing.notes.extend(notes);
-    Ok(listing)
+    Ok(list_frames(Layout::Llff, path, &images, &frames, None, notes, split))
 }
 
 fn frame(name: String, row: &[f64; N_NUMBERS]) -> Frame {

@@ -10,20 +10,15 @@ use std::path::{Path, PathBuf};
 use pocketsplat_files::{shell_word, shown};
 use roxmltree::{Document, Node};
 
-use super::listing::{Listing, Note, every_nth, is_listed};
+use super::lens::MAX_SKEW_PX;
+use super::listing::{Listing, Note, every_nth, files_with};
 use super::transforms::{Frame, Intrinsics, list_frames};
 use super::{DatasetError, Layout, LoadOptions, image_folder, text_file};
 
-/// A skew that moves pixels by less than this is left out without a word.
-const MAX_SKEW_PX: f64 = 0.5;
-
 /// The file of cameras in the folder: the first by name that is one.
 fn file(folder: &Path) -> Option<PathBuf> {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
-    let mut files: Vec<PathBuf> = entries.filter(|path| is_listed(path, "xml")).collect();
-    files.sort();
     let is_one = |text: String| text.contains("<document") && text.contains("<chunk");
-    files.into_iter().find(|path| text_file::read(path).is_ok_and(is_one))
+    files_with(folder, "xml").into_iter().find(|path| text_file::read(path).is_ok_and(is_one))
 }
 
 /// Whether the folder is of this layout.
@@ -37,7 +32,7 @@ pub(super) fn is_layout_of(folder: &Path) -> bool {
 /// As [`super::load`], as far as files but no pixels tell.
 pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, DatasetError> {
     let Some(path) = file(folder) else { return Err(DatasetError::NotAFolder { path: folder.to_owned() }) };
-    let text = text_file::read(&path).map_err(|source| DatasetError::of_reading(&path, source))?;
+    let text = text_file::read(&path)?;
     let document = Document::parse(&text).map_err(|error| {
         DatasetError::of_model(&path, format!("line {}", error.pos().row), format!("no XML: {error}"))
     })?;
@@ -50,13 +45,9 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
         return Err(DatasetError::NoCapture { found: without_poses(folder, &path, elements("camera").count()) });
     }
     frames.sort_by(|a, b| a.name().cmp(b.name()));
-    let Some(images) = image_folder::choose(folder, options, &mut notes)?.map(|name| folder.join(name)) else {
-        return Err(DatasetError::ImageFolder { path: folder.to_owned(), wanted: None, present: Vec::new() });
-    };
+    let images = image_folder::needed(folder, options, &mut notes)?;
     let split = |i| Some(every_nth(options.test_every, i));
-    let mut listing = list_frames(Layout::Metashape, path, &images, &frames, &Intrinsics::default(), None, split);
-    listing.notes.extend(notes);
-    Ok(listing)
+    Ok(list_frames(Layout::Metashape, path, &images, &frames, None, notes, split))
 }
 
 /// What to tell where no camera has a pose.
@@ -125,12 +116,7 @@ fn frame(camera: Node<'_, '_>, lenses: &HashMap<&str, Intrinsics>) -> Option<Fra
     }
     let transform = camera.children().find(|node| node.has_tag_name("transform"))?.text()?;
     let numbers: Vec<f64> = transform.split_whitespace().map(|word| word.parse().unwrap_or(f64::NAN)).collect();
-    // From OpenCV's axes to OpenGL's: y and z turn.
-    let rows: Vec<Vec<f64>> = numbers
-        .chunks(4)
-        .take(3)
-        .map(|row| row.iter().zip([1.0, -1.0, -1.0, 1.0]).map(|(number, sign)| number * sign).collect())
-        .collect();
+    let rows = numbers.chunks(4).take(3).map(<[f64]>::to_vec).collect();
     let own = camera.attribute("sensor_id").and_then(|id| lenses.get(id)).cloned().unwrap_or_default();
-    Some(Frame::new(camera.attribute("label")?.to_owned(), &rows, own))
+    Some(Frame::of_opencv(camera.attribute("label")?.to_owned(), rows, own))
 }

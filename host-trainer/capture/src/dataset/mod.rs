@@ -77,10 +77,12 @@ mod view;
 mod view_fault;
 
 pub use cache::{FileFault, remove_cache};
+pub use colmap::{colmap_focal_lengths_px, colmap_posed_names, colmap_reprojection_errors_px};
 pub use detect::layout_of;
 pub use diagnose::{Diagnosis, Finding, MAX_FOCAL_RATIO, MaskedView, diagnose};
 pub use error::DatasetError;
 pub use frame_size::{FrameSize, NoFrameSize};
+pub use image_names::{FILM_EXTENSIONS, PHOTOGRAPH_EXTENSIONS, PHOTOGRAPH_FOLDERS, TELEPHONE_EXTENSIONS};
 pub use layout::Layout;
 pub use made_points::PointsFile;
 pub use mask::Mask;
@@ -240,20 +242,8 @@ fn list(path: &Path, options: &LoadOptions) -> Result<listing::Listing, DatasetE
             None => DatasetError::NotAFolder { path },
         });
     }
-    let mut listing = match detect::layout_of(path) {
-        Some(Layout::Blender) => blender::list(path, options),
-        Some(Layout::Colmap) => colmap::list(path, options),
-        Some(Layout::Nerfstudio) => nerfstudio::list(path, options),
-        Some(Layout::Polycam) => polycam::list(path, options),
-        Some(Layout::Record3d) => record3d::list(path, options),
-        Some(Layout::Nsvf) => nsvf::list(path, options),
-        Some(Layout::Llff) => llff::list(path, options),
-        Some(Layout::Metashape) => metashape::list(path, options),
-        Some(Layout::RealityCapture) => realitycapture::list(path, options),
-        Some(Layout::Bundler) => bundler::list(path, options),
-        Some(Layout::OpenSfm) => opensfm::list(path, options),
-        None => Err(detect::unknown_layout(path)),
-    }?;
+    let Some(reader) = detect::reader_of(path) else { return Err(detect::unknown_layout(path)) };
+    let mut listing = (reader.list)(path, options)?;
     let has_images = !matches!(listing.layout, Layout::Blender | Layout::Polycam | Layout::Record3d | Layout::Nsvf);
     for (option, is_ignored) in [
         ("--images", options.images.is_some() && !has_images),

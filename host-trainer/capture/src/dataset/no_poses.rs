@@ -4,18 +4,13 @@ use std::path::Path;
 
 use pocketsplat_files::{beside, shell_word, shown};
 
-use super::image_names::{conversion, has_foreign_name, is_image_name};
+use super::image_names::{
+    FILM_EXTENSIONS, PHOTOGRAPH_FOLDERS, TELEPHONE_EXTENSIONS, conversion, has_extension, has_foreign_name,
+    is_image_name,
+};
 
-/// Folders that photographs are kept in, the capture's own last.
-const FOLDERS: [&str; 5] = ["images", "input", "rgb", "photos", "."];
-/// Extensions of films.
-const FILMS: [&str; 5] = ["mp4", "mov", "mkv", "avi", "webm"];
 /// Extensions of packed captures: Record3D's are archives of that kind, too.
 const ARCHIVES: [&str; 2] = ["zip", "r3d"];
-
-fn extension(name: &str) -> String {
-    name.rsplit_once('.').map_or_else(String::new, |(_, extension)| extension.to_ascii_lowercase())
-}
 
 fn file_names(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
@@ -29,18 +24,14 @@ fn file_names(folder: &Path) -> Vec<String> {
 pub(super) fn found_instead(folder: &Path) -> Option<String> {
     photographs(folder).or_else(|| {
         let names = file_names(folder);
-        let name = names.iter().find(|name| FILMS.contains(&extension(name).as_str()) || is_archive(name))?;
+        let name = names.iter().find(|name| has_extension(name, &FILM_EXTENSIONS) || has_extension(name, &ARCHIVES))?;
         file_instead(&folder.join(name))
     })
 }
 
-fn is_archive(name: &str) -> bool {
-    ARCHIVES.contains(&extension(name).as_str())
-}
-
 /// The photographs in a folder and the command that poses them.
 fn photographs(folder: &Path) -> Option<String> {
-    let with_names = FOLDERS.iter().map(|name| {
+    let with_names = PHOTOGRAPH_FOLDERS.iter().map(|name| {
         let images = if *name == "." { folder.to_owned() } else { folder.join(name) };
         let names = file_names(&images);
         (*name, images, names)
@@ -53,8 +44,8 @@ fn photographs(folder: &Path) -> Option<String> {
             continue;
         }
         // Those of telephones the command converts itself.
-        let is_of_telephone = |name: &&&String| ["heic", "heif", "avif"].contains(&extension(name).as_str());
-        let by_hand: Vec<&&String> = foreign.iter().filter(|name| !is_of_telephone(name)).collect();
+        let by_hand: Vec<&&String> =
+            foreign.iter().filter(|name| !has_extension(name, &TELEPHONE_EXTENSIONS)).collect();
         let convert = by_hand.first().filter(|_| foreign.len() > n_read).map_or_else(String::new, |name| {
             format!("convert those of a format that is not read:\n  {}\nthen ", conversion(&images, name))
         });
@@ -86,16 +77,16 @@ pub(super) fn file_instead(path: &Path) -> Option<String> {
     let name = path.file_name()?.to_string_lossy();
     let stem = path.with_extension("");
     let (file, folder) = (shell_word(path), shell_word(&stem));
-    let (film, path, ending) = (path, shown(path), extension(&name));
-    if FILMS.contains(&ending.as_str()) {
+    let (film, path) = (path, shown(path));
+    if has_extension(&name, &FILM_EXTENSIONS) {
         Some(format!("`{path}` is a film, needed: photographs with poses; {}", poses(film, &stem)))
-    } else if is_archive(&name) {
+    } else if has_extension(&name, &ARCHIVES) {
         Some(format!(
             "`{path}` is a packed capture, needed: its files; unpack it and give the folder `{}`:\n  \
              unzip {file} -d {folder}",
             shown(&stem)
         ))
-    } else if ending == "json" {
+    } else if has_extension(&name, &["json"]) {
         Some(format!("`{path}` is a file, needed: a folder; give the folder that it lies in"))
     } else {
         None

@@ -1,5 +1,26 @@
 //! JSON with the bare words `NaN` and `Infinity`, which Python writes and JSON lacks.
 
+use std::path::Path;
+
+use serde::de::DeserializeOwned;
+
+use super::{DatasetError, text_file};
+
+/// Reads a file of another program's export.
+///
+/// * `what`: what the file should be; `needs`: what it has to hold.
+///
+/// # Errors
+/// Those of [`text_file::read`], and [`DatasetError::Json`].
+pub(super) fn read_export<T: DeserializeOwned>(
+    path: &Path,
+    what: &'static str,
+    needs: &'static str,
+) -> Result<T, DatasetError> {
+    let text = text_file::read(path)?;
+    read(&text, |text| serde_json::from_str(text)).map_err(|source| DatasetError::of_json(path, what, needs, source))
+}
+
 /// Reads JSON; where that fails, the same with `null` in place of such words, so that they cost one view, not all.
 ///
 /// # Errors

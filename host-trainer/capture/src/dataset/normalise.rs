@@ -37,14 +37,17 @@ impl Normalisation {
     }
 }
 
+/// Numbers drawn evenly from 0 to 1, without 1; the same for the same seed on every machine.
+pub(super) fn unit_numbers(seed: u64) -> impl FnMut() -> f64 {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    // The upper 53 bits, the precision of f64, as a fraction of 1.
+    move || (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+}
+
 /// `n` points drawn evenly from the cube [−1.3, 1.3]³, capture units; the same for the same seed on every machine.
 pub(super) fn random_points_world(n: usize, seed: u64) -> Vec<DVec3> {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut coordinate = || {
-        // The upper 53 bits, the precision of f64, as a fraction of 1.
-        let unit = (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
-        RANDOM_CUBE_HALF * (2.0 * unit - 1.0)
-    };
+    let mut unit = unit_numbers(seed);
+    let mut coordinate = || RANDOM_CUBE_HALF * (2.0 * unit() - 1.0);
     (0..n).map(|_| DVec3::new(coordinate(), coordinate(), coordinate())).collect()
 }
 

@@ -3,11 +3,12 @@
 //! Poses are camera to world in OpenCV's axes. Names that start with `0_`, `1_` and `2_` are of the splits for training,
 //! validation and testing; where no name starts with `2_`, those with `1_` are tested on.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use pocketsplat_files::shown;
 
-use super::listing::{Listing, Note, every_nth, is_listed};
+use super::lens::MAX_SKEW_PX;
+use super::listing::{Listing, Note, every_nth, files_with};
 use super::transforms::{Frame, Intrinsics, list_frames};
 use super::{DatasetError, Layout, LoadOptions, Split, text_file};
 
@@ -26,11 +27,9 @@ pub(super) fn is_layout_of(folder: &Path) -> bool {
 /// As [`super::load`], as far as files but no pixels tell.
 pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, DatasetError> {
     let mut notes = Vec::new();
-    let shared = intrinsics(&folder.join(INTRINSICS), &mut notes)?;
-    let entries = std::fs::read_dir(folder.join(POSES)).into_iter().flatten().flatten().map(|entry| entry.path());
-    let mut files: Vec<PathBuf> = entries.filter(|path| is_listed(path, "txt")).collect();
-    files.sort();
-    let frames = files.iter().map(|path| frame(path)).collect::<Result<Vec<_>, _>>()?;
+    let lens = intrinsics(&folder.join(INTRINSICS), &mut notes)?;
+    let files = files_with(&folder.join(POSES), "txt");
+    let frames = files.iter().map(|path| frame(path, lens.clone())).collect::<Result<Vec<_>, _>>()?;
     let has = |prefix: &str| frames.iter().any(|frame| frame.name().starts_with(prefix));
     let (is_split, has_test) = (has("0_") && (has("1_") || has("2_")), has("2_"));
     let split = |i: usize| match frames.get(i).and_then(|frame| frame.name().split_once('_')) {
@@ -40,9 +39,7 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
         Some(("1" | "2", _)) => Some(Split::Test),
         _ => None,
     };
-    let mut listing =
-        list_frames(Layout::Nsvf, folder.join(POSES), &folder.join(IMAGES), &frames, &shared, None, split);
-    listing.notes.extend(notes);
+    let mut listing = list_frames(Layout::Nsvf, folder.join(POSES), &folder.join(IMAGES), &frames, None, notes, split);
     let n_unused = frames.len() - listing.views.len();
     if n_unused > 0 {
         listing.notes.push(Note::new("unused-split", format!("views for validation, not used: {n_unused}")));
@@ -52,7 +49,7 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
 
 /// The numbers of a text file, by lines.
 fn numbers(path: &Path) -> Result<Vec<Vec<f64>>, DatasetError> {
-    let text = text_file::read(path).map_err(|source| DatasetError::of_reading(path, source))?;
+    let text = text_file::read(path)?;
     let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
     let line = |(i, line): (usize, &str)| {
         let number = |word: &str| {
@@ -63,9 +60,6 @@ fn numbers(path: &Path) -> Result<Vec<Vec<f64>>, DatasetError> {
     };
     lines.map(line).collect()
 }
-
-/// A skew that moves a pixel at the border by less than this many pixels is left out without a word.
-const MAX_SKEW_PX: f64 = 0.5;
 
 /// A matrix `fx s cx …`, `0 fy cy …`, `0 0 1 …`, told by its rows of one length, or one line `f cx cy …`. The skew `s` is left out.
 fn intrinsics(path: &Path, notes: &mut Vec<Note>) -> Result<Intrinsics, DatasetError> {
@@ -96,12 +90,7 @@ fn intrinsics(path: &Path, notes: &mut Vec<Note>) -> Result<Intrinsics, DatasetE
     Ok(Intrinsics { fl_x, fl_y, cx, cy, ..Intrinsics::default() })
 }
 
-fn frame(path: &Path) -> Result<Frame, DatasetError> {
-    let mut rows = numbers(path)?;
-    // From OpenCV's axes to OpenGL's: y and z turn.
-    for row in rows.iter_mut().take(3) {
-        row.iter_mut().skip(1).take(2).for_each(|number| *number = -*number);
-    }
+fn frame(path: &Path, lens: Intrinsics) -> Result<Frame, DatasetError> {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    Ok(Frame::new(stem, &rows, Intrinsics::default()))
+    Ok(Frame::of_opencv(stem, numbers(path)?, lens))
 }

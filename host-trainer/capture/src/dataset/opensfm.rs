@@ -14,7 +14,7 @@ use super::image_folder;
 use super::listing::{Listing, Note, every_nth};
 use super::points::{Points, rgb8};
 use super::transforms::{Frame, Intrinsics, list_frames};
-use super::{DatasetError, Layout, LoadOptions, non_finite, text_file};
+use super::{DatasetError, Layout, LoadOptions, non_finite};
 
 const FILES: [&str; 2] = ["reconstruction.json", "opensfm/reconstruction.json"];
 
@@ -74,10 +74,8 @@ pub(super) fn is_layout_of(folder: &Path) -> bool {
 /// As [`super::load`], as far as files but no pixels tell.
 pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, DatasetError> {
     let Some(path) = file(folder) else { return Err(DatasetError::NotAFolder { path: folder.to_owned() }) };
-    let text = text_file::read(&path).map_err(|source| DatasetError::of_reading(&path, source))?;
     let needs = "a list of reconstructions with `cameras` and `shots`";
-    let reconstructions: Vec<Reconstruction> = non_finite::read(&text, |text| serde_json::from_str(text))
-        .map_err(|source| DatasetError::of_json(&path, "a reconstruction of OpenSfM", needs, source))?;
+    let reconstructions: Vec<Reconstruction> = non_finite::read_export(&path, "a reconstruction of OpenSfM", needs)?;
     let mut notes = Vec::new();
     if reconstructions.len() > 1 {
         let counts: Vec<String> = reconstructions.iter().map(|one| one.shots.len().to_string()).collect();
@@ -103,9 +101,7 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     let points: Points = largest.points.values().map(point).collect();
     let points = Some((path.clone(), points)).filter(|(_, points)| !points.is_empty());
     let split = |i| Some(every_nth(options.test_every, i));
-    let mut listing = list_frames(Layout::OpenSfm, path, &images, &frames, &Intrinsics::default(), points, split);
-    listing.notes.extend(notes);
-    Ok(listing)
+    Ok(list_frames(Layout::OpenSfm, path, &images, &frames, points, notes, split))
 }
 
 fn frame(name: &str, shot: &Shot, cameras: &BTreeMap<String, Camera>) -> Frame {
@@ -119,9 +115,8 @@ fn frame(name: &str, shot: &Shot, cameras: &BTreeMap<String, Camera>) -> Frame {
     let (to_world, centre) = (rotation.transpose(), -(rotation.transpose() * translation));
     // From OpenCV's axes to OpenGL's: y and z turn.
     let opengl = to_world * DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
-    let rows: Vec<Vec<f64>> =
-        (0..3).map(|i| opengl.row(i).to_array().into_iter().chain([centre[i]]).collect()).collect();
-    Frame::new(name.to_owned(), &rows, cameras.get(&shot.camera).map(Camera::intrinsics).unwrap_or_default())
+    let lens = cameras.get(&shot.camera).map(Camera::intrinsics).unwrap_or_default();
+    Frame::of_pose(name.to_owned(), opengl, centre, lens)
 }
 
 impl Camera {

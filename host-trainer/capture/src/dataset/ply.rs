@@ -13,7 +13,7 @@ use super::points::{Points, rgb8};
 /// # Errors
 /// [`DatasetError::Read`], or [`DatasetError::Ply`] with what was found.
 pub(super) fn read_points(path: &Path) -> Result<Points, DatasetError> {
-    let bytes = std::fs::read(path).map_err(|source| DatasetError::Read { path: path.to_owned(), source })?;
+    let bytes = std::fs::read(path).map_err(|source| DatasetError::of_reading(path, source))?;
     parse(&bytes).map_err(|found| DatasetError::of_points(path, found))
 }
 

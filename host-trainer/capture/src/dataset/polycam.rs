@@ -9,9 +9,9 @@ use serde_json::Value;
 
 use super::depth_map::DepthMap;
 use super::image_names::is_image_name;
-use super::listing::{Listing, every_nth, is_listed};
+use super::listing::{Listing, every_nth, files_with};
 use super::transforms::{Frame, Intrinsics, list_frames};
-use super::{DatasetError, Layout, LoadOptions, non_finite, text_file};
+use super::{DatasetError, Layout, LoadOptions, non_finite};
 
 /// Cameras and their images: optimised over all moments and undistorted first, as tracked where there are none.
 const FOLDERS: [(&str, &str); 2] = [("corrected_cameras", "corrected_images"), ("cameras", "images")];
@@ -21,13 +21,12 @@ fn folders(folder: &Path) -> Option<(PathBuf, PathBuf)> {
     let keyframes = folder.join("keyframes");
     let folders = FOLDERS.iter().map(|(cameras, images)| (keyframes.join(cameras), keyframes.join(images)));
     let there: Vec<_> = folders.filter(|(cameras, images)| cameras.is_dir() && images.is_dir()).collect();
-    let holds = |folder: &Path, is_wanted: fn(&Path) -> bool| {
-        std::fs::read_dir(folder).into_iter().flatten().flatten().any(|entry| is_wanted(&entry.path()))
+    let holds_images = |images: &Path| {
+        let mut entries = std::fs::read_dir(images).into_iter().flatten().flatten();
+        entries.any(|entry| is_image_name(&entry.file_name().to_string_lossy()))
     };
-    let is_image = |path: &Path| path.file_name().is_some_and(|name| is_image_name(&name.to_string_lossy()));
-    let full = |(cameras, images): &&(PathBuf, PathBuf)| {
-        holds(cameras, |path| is_listed(path, "json")) && holds(images, is_image)
-    };
+    let full =
+        |(cameras, images): &&(PathBuf, PathBuf)| !files_with(cameras, "json").is_empty() && holds_images(images);
     there.iter().find(full).or_else(|| there.first()).cloned()
 }
 
@@ -44,12 +43,9 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     let Some((cameras, images)) = folders(folder) else {
         return Err(DatasetError::NotAFolder { path: folder.join("keyframes") });
     };
-    let entries = std::fs::read_dir(&cameras).into_iter().flatten().flatten().map(|entry| entry.path());
-    let mut files: Vec<PathBuf> = entries.filter(|path| is_listed(path, "json")).collect();
-    files.sort();
-    let frames = files.iter().map(|path| frame(path)).collect::<Result<Vec<_>, _>>()?;
+    let frames = files_with(&cameras, "json").iter().map(|path| frame(path)).collect::<Result<Vec<_>, _>>()?;
     let split = |i| Some(every_nth(options.test_every, i));
-    let mut listing = list_frames(Layout::Polycam, cameras, &images, &frames, &Intrinsics::default(), None, split);
+    let mut listing = list_frames(Layout::Polycam, cameras, &images, &frames, None, Vec::new(), split);
     let map = |kind: &str, photograph: &Path| {
         folder.join("keyframes").join(kind).join(photograph.file_name().unwrap_or_default()).with_extension("png")
     };
@@ -61,10 +57,8 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
 
 /// The frame that a camera's file describes; numbers that are missing become NaN, which its view is left out for.
 fn frame(path: &Path) -> Result<Frame, DatasetError> {
-    let text = text_file::read(path).map_err(|source| DatasetError::of_reading(path, source))?;
     let needs = "`fx`, `fy`, `cx`, `cy`, `width`, `height` and `t_00` to `t_23`";
-    let camera: Value = non_finite::read(&text, |text| serde_json::from_str(text))
-        .map_err(|source| DatasetError::of_json(path, "a camera of Polycam", needs, source))?;
+    let camera: Value = non_finite::read_export(path, "a camera of Polycam", needs)?;
     let number = |name: &str| camera[name].as_f64();
     let row = |i: usize| (0..4).map(|j| number(&format!("t_{i}{j}")).unwrap_or(f64::NAN)).collect();
     let own = Intrinsics {

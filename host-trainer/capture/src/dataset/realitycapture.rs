@@ -7,10 +7,10 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use glam::DMat3;
+use glam::{DMat3, DVec3};
 
 use super::image::read_header;
-use super::listing::{Listing, every_nth, is_listed};
+use super::listing::{Listing, every_nth, files_with};
 use super::named_path::NamedPath;
 use super::transforms::{Frame, Intrinsics, list_frames};
 use super::{DatasetError, Layout, LoadOptions, image_folder, text_file};
@@ -23,10 +23,8 @@ const FILM_MM: f64 = 36.0;
 
 /// The table in the folder: the first by name whose head has the columns.
 fn table(folder: &Path) -> Option<PathBuf> {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
-    let mut tables: Vec<PathBuf> = entries.filter(|path| is_listed(path, "csv")).collect();
-    tables.sort();
-    tables.into_iter().find(|path| text_file::read(path).is_ok_and(|text| columns(&text).is_some()))
+    let is_one = |text: String| columns(&text).is_some();
+    files_with(folder, "csv").into_iter().find(|path| text_file::read(path).is_ok_and(is_one))
 }
 
 /// Whether the folder is of this layout.
@@ -49,12 +47,10 @@ fn columns(text: &str) -> Option<(usize, HashMap<String, usize>)> {
 /// As [`super::load`], as far as files but no pixels tell.
 pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, DatasetError> {
     let Some(path) = table(folder) else { return Err(DatasetError::NotAFolder { path: folder.to_owned() }) };
-    let text = text_file::read(&path).map_err(|source| DatasetError::of_reading(&path, source))?;
+    let text = text_file::read(&path)?;
     let (head, columns) = columns(&text).unwrap_or_default();
     let mut notes = Vec::new();
-    let Some(images) = image_folder::choose(folder, options, &mut notes)?.map(|name| folder.join(name)) else {
-        return Err(DatasetError::ImageFolder { path: folder.to_owned(), wanted: None, present: Vec::new() });
-    };
+    let images = image_folder::needed(folder, options, &mut notes)?;
     let names = FolderNames::default();
     let lines =
         text.lines().enumerate().skip(head + 1).filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
@@ -67,11 +63,9 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
             number(name).ok_or_else(|| DatasetError::of_model(&path, format!("line {}", i + 1), found()))
         };
         let name = cell("name").unwrap_or_default();
-        let centre = [needed("x")?, needed("y")?, needed("alt")?];
+        let centre = DVec3::new(needed("x")?, needed("y")?, needed("alt")?);
         let [heading, pitch, roll] = [needed("heading")?, needed("pitch")?, needed("roll")?].map(f64::to_radians);
         let rotation = DMat3::from_rotation_z(-heading) * DMat3::from_rotation_x(pitch) * DMat3::from_rotation_y(roll);
-        let rows: Vec<Vec<f64>> =
-            (0..3).map(|i| rotation.row(i).to_array().into_iter().chain([centre[i]]).collect()).collect();
         // The film's side is the image's longer one; without the image the view is left out anyway.
         let size_px = NamedPath::new(name).image(&names, &images, None).and_then(|path| read_header(&path).ok());
         let [w, h] = size_px.map_or([1, 1], |header| [header.size_px.0, header.size_px.1]).map(f64::from);
@@ -90,13 +84,10 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
             p2: number("t2"),
             ..Intrinsics::default()
         };
-        Ok(Frame::new(name.to_owned(), &rows, own))
+        Ok(Frame::of_pose(name.to_owned(), rotation, centre, own))
     };
     let mut frames = lines.map(frame).collect::<Result<Vec<Frame>, DatasetError>>()?;
     frames.sort_by(|a, b| a.name().cmp(b.name()));
     let split = |i| Some(every_nth(options.test_every, i));
-    let mut listing =
-        list_frames(Layout::RealityCapture, path.clone(), &images, &frames, &Intrinsics::default(), None, split);
-    listing.notes.extend(notes);
-    Ok(listing)
+    Ok(list_frames(Layout::RealityCapture, path, &images, &frames, None, notes, split))
 }

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use glam::{DMat3, DQuat};
+use glam::{DMat3, DQuat, DVec3};
 use serde::Deserialize;
 
 use super::depth_map::DepthMap;
@@ -14,7 +14,7 @@ use super::image_names::is_image_name;
 use super::listing::{Listing, every_nth};
 use super::quaternion::{long_quaternions, rotation_of};
 use super::transforms::{Frame, Intrinsics, list_frames};
-use super::{DatasetError, Layout, LoadOptions, non_finite, text_file};
+use super::{DatasetError, Layout, LoadOptions, non_finite};
 
 /// The file of poses: of an unpacked `.r3d`, and of an export as EXR and JPEG.
 const METADATA: [&str; 2] = ["metadata", "metadata.json"];
@@ -56,14 +56,10 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     let Some((path, pictures)) = files(folder) else {
         return Err(DatasetError::NotAFolder { path: folder.join(PICTURES[0]) });
     };
-    let text = text_file::read(&path).map_err(|source| DatasetError::of_reading(&path, source))?;
     let needs = "`w`, `h`, `K` of 9 numbers and `poses` of 7 numbers each";
-    let metadata: Metadata = non_finite::read(&text, |text| serde_json::from_str(text))
-        .map_err(|source| DatasetError::of_json(&path, "metadata of Record3D", needs, source))?;
+    let metadata: Metadata = non_finite::read_export(&path, "metadata of Record3D", needs)?;
     let [fl_x, _, _, _, fl_y, _, cx, cy, _] = metadata.k;
     let Metadata { w, h, .. } = metadata;
-    let intrinsics =
-        |[fl_x, fl_y, cx, cy]: [Number; 4]| Intrinsics { fl_x, fl_y, cx, cy, w, h, ..Intrinsics::default() };
     // A pose with a number that is none is a fault of its picture.
     let poses: Vec<[f64; 7]> =
         metadata.poses.iter().map(|pose| pose.map(|number| number.unwrap_or(f64::NAN))).collect();
@@ -74,23 +70,22 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     let rotations: Vec<_> = poses.iter().map(|pose| rotation_of(quaternion(pose))).collect();
     let frame = |(i, &[.., x, y, z]): (usize, &[f64; 7])| {
         // A fault takes the place of the view below.
-        let rotation = rotations[i].as_ref().map_or(DMat3::IDENTITY, DMat3::transpose);
-        let rows = [(rotation.x_axis, x), (rotation.y_axis, y), (rotation.z_axis, z)]
-            .map(|(row, along)| vec![row.x, row.y, row.z, along]);
-        let own = match metadata.lenses.get(i).map(Vec::as_slice) {
-            Some(&[Some(fx), fy, cx, cy, ..]) if fx > 0.0 => intrinsics([Some(fx), fy, cx, cy]),
-            _ => Intrinsics::default(),
+        let rotation = rotations[i].as_ref().copied().unwrap_or(DMat3::IDENTITY);
+        // Where a picture has no number of its own, that of all counts.
+        let [fl_x, fl_y, cx, cy] = match metadata.lenses.get(i).map(Vec::as_slice) {
+            Some(&[Some(own_x), own_y, own_cx, own_cy, ..]) if own_x > 0.0 => {
+                [Some(own_x), own_y.or(fl_y), own_cx.or(cx), own_cy.or(cy)]
+            }
+            _ => [fl_x, fl_y, cx, cy],
         };
+        let lens = Intrinsics { fl_x, fl_y, cx, cy, w, h, ..Intrinsics::default() };
         let name = names.get(&(first + i)).cloned().unwrap_or_else(|| (first + i).to_string());
-        Frame::new(name, &rows, own)
+        Frame::of_pose(name, rotation, DVec3::new(x, y, z), lens)
     };
     let frames: Vec<Frame> = poses.iter().enumerate().map(frame).collect();
-    let shared = intrinsics([fl_x, fl_y, cx, cy]);
+    let notes = long_quaternions(&path, frames.iter().map(Frame::name).zip(poses.iter().map(quaternion)));
     let split = |i| Some(every_nth(options.test_every, i));
-    let mut listing = list_frames(Layout::Record3d, path.clone(), &pictures, &frames, &shared, None, split);
-    let named = listing.views.iter().map(|view| view.name.as_str()).zip(poses.iter().map(quaternion));
-    let long = long_quaternions(&path, named);
-    listing.notes.extend(long);
+    let mut listing = list_frames(Layout::Record3d, path, &pictures, &frames, None, notes.into_iter().collect(), split);
     for (view, rotation) in listing.views.iter_mut().zip(rotations) {
         if let Ok(shot) = &mut view.shot {
             shot.depth = DepthMap::at(shot.path.with_extension("depth"), shot.path.with_extension("conf"));

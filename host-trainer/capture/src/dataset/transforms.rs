@@ -86,21 +86,22 @@ impl Transforms {
     }
 }
 
-/// Lists frames of a layout that brings no list of splits, in their order.
+/// Lists frames of a layout that brings no list of splits, in their order, each with a lens of its own.
 ///
 /// * `source`: what lists the frames; `images`: the folder that their paths start from.
+/// * `of_reader`: notes of the layout's reader, which go behind those made here.
 /// * `split`: of the frame at a place; none leaves it out.
 pub(super) fn list_frames(
     layout: Layout,
     source: PathBuf,
     images: &Path,
     frames: &[Frame],
-    shared: &Intrinsics,
     points: Option<(PathBuf, Points)>,
+    of_reader: Vec<Note>,
     split: impl Fn(usize) -> Option<Split> + Sync,
 ) -> Listing {
-    let names = FolderNames::default();
-    let view = |(i, frame): (usize, &Frame)| Some(frame.view(split(i)?, &names, images, None, shared));
+    let (names, shared) = (FolderNames::default(), Intrinsics::default());
+    let view = |(i, frame): (usize, &Frame)| Some(frame.view(split(i)?, &names, images, None, &shared));
     let mut views: Vec<ListedView> = frames.par_iter().enumerate().filter_map(view).collect();
     let found: Vec<PathBuf> = frames.iter().filter_map(|frame| frame.image(&names, images, None)).collect();
     let unposed = unused_images(images, found.iter().map(PathBuf::as_path));
@@ -112,6 +113,7 @@ pub(super) fn list_frames(
     if !listing.has_test_views() {
         listing.notes.push(Note::no_test_views());
     }
+    listing.notes.extend(of_reader);
     listing
 }
 
@@ -160,10 +162,7 @@ impl Frame {
         let path = self
             .image(names, folder, images)
             .ok_or_else(|| ViewFault::of_missing(self.path().expected(folder, images), "the capture"))?;
-        let header = match read_header(&path) {
-            Ok(header) => header,
-            Err(message) => return Err(ViewFault::of_header(path, message)),
-        };
+        let header = read_header(&path).map_err(|message| ViewFault::of_header(&path, message))?;
         let lens = camera::lens(&self.own, shared, &path, &header, self.numbers_px(names, folder, images, &header))?;
         let mut masks: Vec<MaskFile> = MaskFile::dynamic(names, &path).into_iter().collect();
         if let Some(named) = self.mask_path.as_deref().map(NamedPath::new) {

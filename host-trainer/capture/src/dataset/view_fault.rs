@@ -6,7 +6,7 @@ use pocketsplat_files::{FileKind, out_of_reach, shown, why_missing};
 
 use super::PoseFault;
 use super::camera_models::READABLE_MODELS;
-use super::image_names::{EXTENSIONS, conversion, foreign_name};
+use super::image_names::{PHOTOGRAPH_EXTENSIONS, conversion, foreign_name};
 
 /// Why one view cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -17,7 +17,7 @@ pub enum ViewFault {
     #[error(
         "image missing: `{}` does not exist, nor does the same with the extension {}; restore it or take the view out of \
          {listed_in}",
-        shown(path), EXTENSIONS.join(" or ")
+        shown(path), PHOTOGRAPH_EXTENSIONS.join(" or ")
     )]
     Missing { path: PathBuf, listed_in: &'static str },
     /// The image is there, or a link in its place, and cannot be reached.
@@ -109,7 +109,8 @@ impl ViewFault {
     }
 
     /// The fault of an image with an unreadable header.
-    pub(super) fn of_header(path: PathBuf, message: String) -> Self {
+    pub(super) fn of_header(path: &Path, message: String) -> Self {
+        let path = path.to_owned();
         match FileKind::of_file(&path).ok().flatten() {
             // Damaged, or cut.
             None | Some(FileKind::Png | FileKind::Jpeg | FileKind::WebP) => Self::Unreadable { path, message },

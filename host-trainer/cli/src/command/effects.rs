@@ -3,14 +3,12 @@
 mod pilots;
 
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
 use pocketsplat_capture::dataset::Capture;
-use pocketsplat_files::shell_word;
 use pocketsplat_instructions::Processor;
-use pocketsplat_trainer::effects::{Effect, PilotCapture, PilotError, Pilots, measure};
+use pocketsplat_trainer::effects::{Effect, PilotCapture, PilotError, PilotTraining, Pilots, measure};
 use pocketsplat_trainer::train::run::RunFolder;
 use serde::{Deserialize, Serialize};
 
@@ -19,6 +17,7 @@ use crate::say::say;
 
 use super::output;
 use super::outputs::keep;
+use super::train::Attempt;
 use pilots::PilotsFile;
 
 /// The table of pilots in a run's folder.
@@ -73,7 +72,7 @@ pub(crate) fn resolve(
     config: &mut RunConfig,
     capture: &Capture,
     folder: &RunFolder,
-    stop: &AtomicBool,
+    attempt: &Attempt<'_>,
 ) -> Result<Resolved> {
     if !std::mem::take(&mut config.effects.auto) {
         return Ok(Resolved::Ready);
@@ -91,14 +90,16 @@ pub(crate) fn resolve(
     let started = Instant::now();
     let (price, target) = (config.effects.price, config.effects.target.unwrap_or(Processor::CortexM4));
     let mut log = PilotsFile::open(folder.pilots())?;
-    let measured = measure(&views, &config.train, &price, target, &config.encoding, &mut log, stop);
+    let Attempt { device, stop, goes_on } = attempt;
+    let training = PilotTraining { capture: &views, config: &config.train, device: device.clone(), stop };
+    let measured = measure(&training, &price, target, &config.encoding, &mut log);
     log.end();
     let trials = match measured {
         Err(PilotError::Interrupted) => {
             say!(
-                "interrupted while effects were measured, {} pilots are kept; go on with `pocketsplat train --resume {}`",
+                "interrupted while effects were measured, {} pilots are kept; {}",
                 log.n_done(),
-                shell_word(folder.path())
+                goes_on.said(folder.path())
             );
             return Ok(Resolved::Interrupted);
         }

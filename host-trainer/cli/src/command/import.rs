@@ -10,6 +10,7 @@ use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Background, Capture, FrameSize};
 use pocketsplat_core::Budget;
 use pocketsplat_files::shell_word;
+use pocketsplat_gaussians::Frame;
 use pocketsplat_trainer::explicit::bulk::Bulk;
 use pocketsplat_trainer::explicit::frame;
 use pocketsplat_trainer::explicit::pictures::{Pictures, capture};
@@ -255,31 +256,33 @@ fn captured(args: &Args, file: &GaussiansFile, bulk: &Bulk, cameras: [&[Camera];
     let capture = capture(&file.gaussians, bulk, centre, cameras, &how);
     let mut capture = capture.context("all cameras stand in one point; give --cameras that stand apart")?;
     capture.normalisation = frame::of_scene_through_file(&file.notes.frame, &capture.normalisation);
-    warn_of_the_blind(args, bulk, &capture)?;
+    warn_of_the_blind(args, bulk, &file.notes.frame, &capture)?;
     Ok(capture)
 }
 
 /// Says how many cameras see no Gaussian.
 ///
+/// * `frame`: where the numbers of `bulk` lie in the scene, which the cameras stand in.
+///
 /// # Errors
 /// None sees one: cameras of another frame, or with other axes.
-fn warn_of_the_blind(args: &Args, bulk: &Bulk, capture: &Capture) -> Result<()> {
+fn warn_of_the_blind(args: &Args, bulk: &Bulk, frame: &Frame, capture: &Capture) -> Result<()> {
     let background = args.background.rgb8();
     let mut n_seeing = 0;
     for view in &capture.train {
         n_seeing += usize::from(view.photograph()?.image.rgb.chunks_exact(3).any(|rgb| *rgb != background));
     }
     let n = capture.train.len();
-    let [x, y, z] = bulk.centre.to_array();
+    let [x, y, z] = std::array::from_fn(|i| frame.offset[i] + frame.scale * bulk.centre[i]);
     let whose = args.cameras.as_deref().map(|path| format!(" of {}", path.display())).unwrap_or_default();
     let what = format!(
         "of {n} cameras{whose} {n_seeing} see a Gaussian of {}, whose bulk has its middle at ({x:.4}, {y:.4}, {z:.4}) and a radius of {:.4}",
         args.points.display(),
-        bulk.radius
+        frame.scale * bulk.radius
     );
     if n_seeing == 0 {
         bail!(
-            "{what}; needed: cameras in the frame of the splats, that look at them, in front of a --background of another colour"
+            "{what}; needed: cameras in the frame of the scene, that look at the splats, in front of a --background of another colour"
         );
     }
     if n_seeing < n {

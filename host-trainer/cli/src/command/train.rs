@@ -243,11 +243,11 @@ fn train_watched<'a>(
         }
         other => other,
     };
-    if effects::resolve(&mut config, capture, &folder, &stop)? == Resolved::Interrupted {
-        return Ok(Ended::Interrupted);
-    }
     let path = folder.path().to_owned();
     let attempt = Attempt { device, stop: &stop, goes_on: GoesOn::Resume(args.device_choice()) };
+    if effects::resolve(&mut config, capture, &folder, &attempt)? == Resolved::Interrupted {
+        return Ok(Ended::Interrupted);
+    }
     let Some(result) = train_in(folder, &config, capture, start, attempt, output)? else {
         return Ok(Ended::Interrupted);
     };

@@ -133,11 +133,22 @@ pub(super) enum Sign {
     Front,
 }
 
-/// Draws a legend, one line each, as far as there is room.
+/// Draws a legend, one line each; where there is no room for all, the last line says how many it leaves out.
 pub(super) fn legend<'n>(area: &Area<'_>, entries: impl IntoIterator<Item = (Sign, &'n str)>) -> Result<()> {
-    let most = (PANEL_PX as i32 - 60) / LEGEND_LINE_PX;
-    for (row, (sign, name)) in (0..most).zip(entries) {
-        let y = 44 + row * LEGEND_LINE_PX;
+    let most = ((PANEL_PX as i32 - 60) / LEGEND_LINE_PX) as usize;
+    let mut entries: Vec<_> = entries.into_iter().collect();
+    let y_of = |row: usize| 44 + row as i32 * LEGEND_LINE_PX;
+    if entries.len() > most {
+        let n_left_out = entries.len() - (most - 1);
+        entries.truncate(most - 1);
+        area.draw(&Text::new(
+            format!("and {n_left_out} more"),
+            (24, y_of(most - 1) - NOTE_PX as i32 / 2),
+            note_style(&INK),
+        ))?;
+    }
+    for (row, (sign, name)) in entries.into_iter().enumerate() {
+        let y = y_of(row);
         let line = |style: ShapeStyle| PathElement::new(vec![(0, y), (18, y)], style);
         match sign {
             Sign::Line(i) => area.draw(&line(colour(i).stroke_width(2)))?,

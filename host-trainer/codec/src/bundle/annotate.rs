@@ -65,11 +65,11 @@ impl<'f> Annotator<'f> {
         dump.field("n_anchors", u32::from_le_bytes);
         dump.field("n_chunks", u32::from_le_bytes);
         dump.field("max_chunk_anchors", u16::from_le_bytes);
-        dump.field::<1, _>("camera convention", |[byte]| byte);
-        dump.field::<1, _>("n_sections", |[byte]| byte);
+        dump.field("camera convention", u8::from_le_bytes);
+        dump.field("n_sections", u8::from_le_bytes);
         dump.array("training size", 2, u16::from_le_bytes);
-        dump.array::<1, _>("background", 3, |[byte]| byte);
-        dump.field::<1, _>("n_tiers", |[byte]| byte);
+        dump.array("background", 3, u8::from_le_bytes);
+        dump.field("n_tiers", u8::from_le_bytes);
         dump.field("voxel_size", f32::from_le_bytes);
         dump.field("colour hidden", u16::from_le_bytes);
         dump.field("detail hidden", u16::from_le_bytes);
@@ -80,8 +80,8 @@ impl<'f> Annotator<'f> {
         dump.array("preview focal", 2, f32::from_le_bytes);
         dump.array("preview principal", 2, f32::from_le_bytes);
         dump.array("preview size", 2, u16::from_le_bytes);
-        dump.array::<1, _>("symbol bits", 3, |[byte]| byte);
-        dump.field::<1, _>("reserved", |[byte]| byte);
+        dump.array("symbol bits", 3, u8::from_le_bytes);
+        dump.field("reserved", u8::from_le_bytes);
         for section in self.bundle.sections() {
             let name = name(section.kind);
             dump.field::<4, _>(&format!("section {name}, kind"), |[kind, ..]| kind);
@@ -112,7 +112,7 @@ impl<'f> Annotator<'f> {
             }
             _ => {
                 self.dump.heading(&format!("section of kind {}", section.code()));
-                self.dump.array::<1, _>("bytes", section.len as usize, |[byte]| byte);
+                self.dump.array("bytes", section.len as usize, u8::from_le_bytes);
             }
         }
         Ok(())
@@ -151,8 +151,8 @@ impl<'f> Annotator<'f> {
         let n_levels = self.bundle.lattice().trie.n_levels();
         self.dump.heading("lattice");
         self.dump.array("min", 3, i32::from_le_bytes);
-        self.dump.field::<1, _>("bits an axis", |[byte]| byte);
-        self.dump.array::<1, _>("reserved", 3, |[byte]| byte);
+        self.dump.field("bits an axis", u8::from_le_bytes);
+        self.dump.array("reserved", 3, u8::from_le_bytes);
         for level in 0..n_levels {
             // Three contexts of two ends.
             self.dump.array(&format!("level {level}"), 6, u16::from_le_bytes);
@@ -188,27 +188,27 @@ impl<'f> Annotator<'f> {
         dump.array("grid min", 3, i32::from_le_bytes);
         dump.array("grid scale", 3, u32::from_le_bytes);
         dump.array("base steps", 3, f32::from_le_bytes);
-        dump.field::<1, _>("n_levels", |[byte]| byte);
-        dump.field::<1, _>("n_taps", |[byte]| byte);
+        dump.field("n_levels", u8::from_le_bytes);
+        dump.field("n_taps", u8::from_le_bytes);
         dump.field("n_hidden", u16::from_le_bytes);
         let mut n_rows = 0;
         for (index, level) in context.levels().enumerate() {
-            dump.field::<1, _>(&format!("level {index}, kind"), |[byte]| byte);
-            dump.field::<1, _>(&format!("level {index}, reserved"), |[byte]| byte);
+            dump.field(&format!("level {index}, kind"), u8::from_le_bytes);
+            dump.field(&format!("level {index}, reserved"), u8::from_le_bytes);
             dump.field(&format!("level {index}, resolution"), u16::from_le_bytes);
             dump.field(&format!("level {index}, n_rows"), u32::from_le_bytes);
             n_rows += level.n_rows as usize;
         }
         let levels = if context.level_shifts().is_some() { (0..N_LEVELS).rev() } else { (0..1).rev() };
         if context.level_shifts().is_some() {
-            dump.array::<1, _>("shifts of levels", 3, |[byte]| byte);
-            dump.field::<1, _>("reserved", |[byte]| byte);
+            dump.array("shifts of levels", 3, u8::from_le_bytes);
+            dump.field("reserved", u8::from_le_bytes);
         }
         for level in levels {
             let n_parent = if level + 1 < N_LEVELS { context.n_parent_inputs() } else { 0 };
             let n_in = if context.level_shifts().is_some() { N_POSITION_INPUTS + n_parent } else { context.n_inputs() };
-            dump.array::<1, _>("shift1", n_hidden, |[byte]| byte);
-            dump.array::<1, _>("shift2", n_out, |[byte]| byte);
+            dump.array("shift1", n_hidden, u8::from_le_bytes);
+            dump.array("shift2", n_out, u8::from_le_bytes);
             dump.array("b1", n_hidden, i32::from_le_bytes);
             dump.array("b2", n_out, i32::from_le_bytes);
             dump.array("W1", n_hidden * n_in, i8::from_le_bytes);
@@ -232,8 +232,8 @@ impl<'f> Annotator<'f> {
             dump.field("most multiply-adds of the heads, 1024s", u32::from_le_bytes);
             dump.field("most pixel evaluations, 1024s", u32::from_le_bytes);
             dump.field("most decoded anchors", u32::from_le_bytes);
-            dump.field::<1, _>("level", |[byte]| byte);
-            dump.array::<1, _>("reserved", 3, |[byte]| byte);
+            dump.field("level", u8::from_le_bytes);
+            dump.array("reserved", 3, u8::from_le_bytes);
         }
     }
 

@@ -36,7 +36,7 @@ impl OutputLayout {
 }
 
 /// One head: `y = W2·relu(W1·x + b1) + b2`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Head<R> {
     /// Inputs.
     pub n_in: usize,
@@ -92,7 +92,7 @@ impl<R: Copy> Head<R> {
 }
 
 /// The heads of a model.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Heads<R> {
     /// [`OutputLayout::Opacity`].
     pub opacity: Head<R>,

@@ -148,38 +148,31 @@ impl<R> Anchors<R> {
         self.lattice.len()
     }
 
+    /// Whether there is no anchor.
+    pub fn is_empty(&self) -> bool {
+        self.lattice.is_empty()
+    }
+}
+
+impl<R: Real> Anchors<R> {
     /// Whether offset `offset` of all anchors' offsets, counted through, is drawn.
     #[inline]
-    pub fn is_drawn(&self, offset: usize) -> bool
-    where
-        R: Real,
-    {
+    pub fn is_drawn(&self, offset: usize) -> bool {
         self.mask_logits[offset] > R::real(MASK_THRESHOLD)
     }
 
     /// Whether any offset of an anchor is drawn; an anchor without is invisible and costs nothing.
     #[inline]
-    pub fn has_drawn(&self, anchor: usize) -> bool
-    where
-        R: Real,
-    {
+    pub fn has_drawn(&self, anchor: usize) -> bool {
         let k = self.mask_logits.len() / self.len();
         (anchor * k..(anchor + 1) * k).any(|offset| self.is_drawn(offset))
     }
 
     /// Switches offsets off, counted through all anchors': sigmoid of their logits is 1e-5 then.
-    pub fn mask(&mut self, offsets: &[usize])
-    where
-        R: Real,
-    {
+    pub fn mask(&mut self, offsets: &[usize]) {
         for offset in offsets {
             self.mask_logits[*offset] = R::real(MASKED);
         }
-    }
-
-    /// Whether there is no anchor.
-    pub fn is_empty(&self) -> bool {
-        self.lattice.is_empty()
     }
 }
 

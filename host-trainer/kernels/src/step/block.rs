@@ -15,7 +15,7 @@ use crate::real::Real;
 use crate::scene::{Anchors, ContextModel, Head, Heads, ModelShape, Scene};
 
 /// A block of visible anchors on its way through the chain; buffers are kept from step to step.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Block<R> {
     /// Indices of its anchors in the scene, ascending.
     pub anchors: Vec<u32>,
@@ -72,34 +72,7 @@ impl<R: Real> Block<R> {
     }
 
     pub(super) fn new(shape: &ModelShape) -> Self {
-        Self {
-            anchors: Vec::new(),
-            gaussians: Vec::new(),
-            sources: Vec::new(),
-            drawn: Vec::new(),
-            screen_gradients: Vec::new(),
-            d_features: Vec::new(),
-            d_log_scales: Vec::new(),
-            d_offsets: Vec::new(),
-            d_mask_logits: Vec::new(),
-            positions: Vec::new(),
-            features: Vec::new(),
-            log_scales: Vec::new(),
-            offsets: Vec::new(),
-            mask_logits: Vec::new(),
-            coded: Coded::default(),
-            input: Vec::new(),
-            hidden: Default::default(),
-            outputs: HeadOutputs::default(),
-            splats: Vec::new(),
-            footprints: Vec::new(),
-            d_gaussians: Vec::new(),
-            detail: detail::ForwardCache::default(),
-            d_outputs: HeadOutputs::default(),
-            d_hidden: Vec::new(),
-            d_input: Vec::new(),
-            d_heads: Heads::filled(shape, R::ZERO),
-        }
+        Self { d_heads: Heads::filled(shape, R::ZERO), ..Self::default() }
     }
 
     /// Copies the rows of `anchors` out of the scene.

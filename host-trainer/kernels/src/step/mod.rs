@@ -117,6 +117,9 @@ impl<R: Real> Workspace<R> {
 
     /// Has [`Self::step`] compute the stages between splats and the loss with `device`, or on the CPU again.
     pub fn set_device(&mut self, device: Option<SharedDevice<R>>) {
+        if let Some(device) = &device {
+            device.lock().unwrap_or_else(PoisonError::into_inner).forget_photographs();
+        }
         self.device = device;
     }
 

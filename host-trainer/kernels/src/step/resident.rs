@@ -93,6 +93,9 @@ pub trait StepDevice<R>: fmt::Debug + Send {
 
     /// The whole step, of a scene that stays there.
     fn resident(&mut self) -> &mut dyn Resident<R>;
+
+    /// Drops the photographs that it keeps by their numbers: those of another capture may come.
+    fn forget_photographs(&mut self);
 }
 
 /// Which scene a device holds: the number of [`Resident::load`]s, that one included.

@@ -18,7 +18,7 @@ pub fn widest_within(bytes: u64, shape: &ModelShape) -> usize {
 
 /// Bytes that the heads of a model take in its bundle, about: one for each parameter.
 pub fn bytes_of_heads(shape: &ModelShape) -> u64 {
-    Heads::filled(shape, 0.0_f32).each().flat_map(Head::groups).map(<[f32]>::len).sum::<usize>() as u64
+    Heads::filled(shape, 0.0_f32).each().map(Head::n_params).sum::<usize>() as u64
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ mod search;
 
 use std::fmt;
 
-pub use pilot::{LEAST_ITERATIONS, PILOTS_TIME_SHARE, PilotCapture, PilotError, PilotLog, measure};
+pub use pilot::{LEAST_ITERATIONS, PILOTS_TIME_SHARE, PilotCapture, PilotError, PilotLog, PilotTraining, measure};
 pub use price::{PilotFigures, Price, choose};
 pub use request::{ParseEffectsError, Request};
 pub use search::{Pilot, Pilots};

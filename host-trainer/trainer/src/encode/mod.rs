@@ -1,6 +1,6 @@
 //! From a finished run to its bundle: coded, cut until it fits, measured, assembled.
 //!
-//! `choice` settles what codes the symbols, `scale` says what a scene takes while it is trained, `fitting` leaves out anchors until the
+//! `choice` settles what codes the symbols, `sizes` says what a scene takes while it is trained, `fitting` leaves out anchors until the
 //! bundle keeps the limits of the device. Both work on
 //! [coded scenes](pocketsplat_codec::bundle::CodedScene); the file is assembled once, when its measures are known.
 

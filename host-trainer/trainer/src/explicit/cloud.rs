@@ -3,6 +3,7 @@
 use pocketsplat_gaussians::{Degree, Gaussians};
 
 use pocketsplat_kernels::ops::image::explicit_gaussians::Stored;
+use pocketsplat_kernels::ops::image::spherical_harmonics::MOST;
 use pocketsplat_kernels::real::Real;
 
 /// As [`Gaussians`] has them: rows of all arrays in the same order.
@@ -68,6 +69,21 @@ impl<R: Real> Cloud<R> {
         self.rotations.push(stored.rotation);
         self.opacity_logits.push(stored.opacity_logit);
         self.harmonics.extend_from_slice(&harmonics[..self.n_coefficients]);
+    }
+}
+
+impl Cloud<f32> {
+    /// Gaussians with room for coefficients of degree 3, as [`CloudOptimiser`](super::optimiser::CloudOptimiser) takes them; those
+    /// beyond their own degree are 0.
+    pub fn with_room(gaussians: &Gaussians) -> Self {
+        let drawn = Self::from(gaussians);
+        let mut cloud = Self { degree: drawn.degree, ..Self::empty(Degree::Three) };
+        for i in 0..drawn.len() {
+            let mut harmonics = [[0.0; 3]; MOST];
+            harmonics[..drawn.n_coefficients].copy_from_slice(drawn.harmonics_of(i));
+            cloud.push(&drawn.stored(i), &harmonics);
+        }
+        cloud
     }
 }
 

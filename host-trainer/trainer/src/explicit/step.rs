@@ -32,10 +32,11 @@ pub struct Drawing<R> {
 }
 
 impl<R: Real> Drawing<R> {
-    /// Σ α·T over the pixels for each splat, times the first channel of `weights`: what it gives the image.
-    pub fn light(&self, level: Level, weights: &TiledImage<R>) -> Vec<R> {
+    /// Σ α·T over the pixels for each splat: what it gives the image, and the derivative of a channel's sum by its colour.
+    pub fn light(&self, level: Level, size_px: [usize; 2]) -> Vec<R> {
         let Self { image, splats, footprints, lists, .. } = self;
-        rasterise::backward(level, splats, footprints, lists, image, weights).iter().map(|d| d.colour[0]).collect()
+        let ones = TiledImage::from_planes(&vec![R::ONE; 3 * size_px[0] * size_px[1]], size_px);
+        rasterise::backward(level, splats, footprints, lists, image, &ones).iter().map(|d| d.colour[0]).collect()
     }
 }
 

@@ -16,9 +16,9 @@ use crate::train::run::checkpoint::{CheckpointFault, Kernels};
 use crate::train::run::watchdog;
 use crate::train::run::{Method, Run, RunState, Setup};
 use crate::train::streams::{Purpose, random};
+use crate::train::views::target;
 use pocketsplat_kernels::ops::image::spherical_harmonics::MOST;
 use pocketsplat_kernels::ops::simd::Level;
-use pocketsplat_kernels::step::{TargetView, planes};
 
 /// Training of explicit Gaussians.
 #[derive(Clone, Copy, Debug)]
@@ -148,8 +148,7 @@ impl CloudTrainer<'_> {
         self.state.learned.cloud.degree = self.degree();
         let (place, photograph) = self.next_view()?;
         let Setup { config, capture, views, .. } = &self.setup;
-        let mask = photograph.mask.as_ref().map(|mask| mask.valid.as_slice());
-        let target = TargetView::new(&views.cameras[place], planes(&photograph.image), mask, capture.background);
+        let target = target(&photograph, &views.cameras[place], capture.background);
         let level = self.machine.device;
         let gradients = step(level, self.cloud(), &target, config.dssim);
         let (rates, at) = (config.rates, [config.progress_at(self.state.iteration), capture.extent]);

@@ -1,7 +1,7 @@
 //! Baked Gaussians moved until their pictures are the bundle's.
 
 use pocketsplat_capture::dataset::Image;
-use pocketsplat_gaussians::{Degree, Gaussians};
+use pocketsplat_gaussians::Gaussians;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -12,7 +12,6 @@ use crate::explicit::optimiser::CloudOptimiser;
 use crate::explicit::step::step;
 use crate::train::schedule::LearningRate;
 use pocketsplat_kernels::ops::Pinhole;
-use pocketsplat_kernels::ops::image::spherical_harmonics::MOST;
 use pocketsplat_kernels::ops::simd::Level;
 use pocketsplat_kernels::step::{TargetView, planes};
 
@@ -44,9 +43,8 @@ pub struct Refinement<'a> {
 /// * `extent`: of the capture; scales the steps of the centres. * `on_step`: is told the number of each step that is done.
 pub fn refine(gaussians: Gaussians, with: &Refinement<'_>, extent: f64, mut on_step: impl FnMut(u32)) -> Gaussians {
     let (level, degree) = (Level::detect(), gaussians.degree);
-    let mut cloud = Cloud::from(&stored_in_full(gaussians));
-    cloud.degree = degree;
-    cloud.compensation = with.compensation;
+    let mut cloud = Cloud { compensation: with.compensation, ..Cloud::with_room(&gaussians) };
+    drop(gaussians);
     let mut optimiser = CloudOptimiser::new(cloud.len());
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
     let mut queue: Vec<usize> = Vec::new();
@@ -64,7 +62,7 @@ pub fn refine(gaussians: Gaussians, with: &Refinement<'_>, extent: f64, mut on_s
         }
         on_step(done + 1);
     }
-    of_degree(cloud.into(), degree)
+    Gaussians::from(cloud).reduced_to(degree)
 }
 
 /// Rates for Gaussians that are nearly right: those of training's middle, falling to a thirtieth.
@@ -78,21 +76,4 @@ fn rates() -> CloudRates {
         colour: falling(2.5e-3),
         bands_divisor: 5.0,
     }
-}
-
-/// The same with all coefficients of degree 3, those beyond its own 0.
-fn stored_in_full(gaussians: Gaussians) -> Gaussians {
-    let mut harmonics = vec![[0.0; 3]; gaussians.len() * MOST];
-    for (index, row) in harmonics.chunks_exact_mut(MOST).enumerate() {
-        let own = gaussians.harmonics_of(index);
-        row[..own.len()].copy_from_slice(own);
-    }
-    Gaussians { degree: Degree::Three, harmonics, ..gaussians }
-}
-
-/// The same with the coefficients of `degree` alone.
-fn of_degree(gaussians: Gaussians, degree: Degree) -> Gaussians {
-    let n = degree.n_coefficients();
-    let harmonics = gaussians.harmonics.chunks_exact(MOST).flat_map(|row| &row[..n]).copied().collect();
-    Gaussians { degree, harmonics, ..gaussians }
 }

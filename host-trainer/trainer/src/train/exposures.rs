@@ -83,7 +83,7 @@ impl Exposures {
     }
 
     /// Whether images are compared under them.
-    pub fn are_in_force(&self) -> bool {
+    fn are_in_force(&self) -> bool {
         self.in_force == Some(true)
     }
 

@@ -159,15 +159,25 @@ pub(super) fn images(bytes: &[u8]) -> Result<Vec<ModelImage>, ModelFault> {
     Ok(images)
 }
 
-/// `points3D.bin`: positions and colours; errors and tracks are stepped over.
+/// `points3D.bin`: positions and colours.
 pub(super) fn points(bytes: &[u8]) -> Result<Points, ModelFault> {
+    let points = points_with_errors(bytes)?;
+    Ok(points.into_iter().map(|(at, rgb, _)| (at, Some(rgb))).collect())
+}
+
+/// A point, its colour, and its error of reprojection in pixels.
+type PointWithError = (DVec3, [u8; 3], f64);
+
+/// `points3D.bin`: positions, colours and errors; tracks are stepped over.
+pub(super) fn points_with_errors(bytes: &[u8]) -> Result<Vec<PointWithError>, ModelFault> {
     let mut points = Vec::new();
     Cursor::new(bytes, "point", MIN_POINT_BYTES)?.each(|cursor| {
         let _point_id = cursor.u64()?;
-        points.push((DVec3::from_array(cursor.f64s()?), Some(cursor.take::<3>()?)));
-        let _error = cursor.take::<8>()?;
+        let (at, rgb) = (DVec3::from_array(cursor.f64s()?), cursor.take::<3>()?);
+        let [error_px] = cursor.f64s::<1>()?;
+        points.push((at, rgb, error_px));
         let n_track = cursor.u64()?;
         cursor.skip("track elements", n_track, TRACK_BYTES)
     })?;
-    Ok(points.into_iter().collect())
+    Ok(points)
 }

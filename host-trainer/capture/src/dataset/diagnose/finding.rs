@@ -30,7 +30,7 @@ pub struct Finding {
 
 impl Finding {
     /// The finding in one line.
-    pub fn in_line(&self) -> String {
+    pub(in crate::dataset) fn in_line(&self) -> String {
         let text =
             if self.remedy.is_empty() { self.message.clone() } else { format!("{}; {}", self.message, self.remedy) };
         format!("{}: {text}", self.severity)

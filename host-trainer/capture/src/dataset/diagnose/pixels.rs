@@ -26,7 +26,7 @@ pub struct MaskedView {
 
 impl MaskedView {
     /// Share of the pixels that are left out.
-    pub fn share(&self) -> f64 {
+    pub(super) fn share(&self) -> f64 {
         self.n_masked_px as f64 / self.n_px.max(1) as f64
     }
 }

@@ -2,12 +2,10 @@
 
 use glam::{DMat3, DVec3};
 
-use crate::camera::{Camera, nearest_to_axes};
+use crate::camera::{Camera, MIN_DETERMINANT, nearest_to_axes};
 use crate::dataset::apart::quantile;
 use crate::dataset::listing::Shot;
 
-/// As `frusta` takes it.
-const MIN_DETERMINANT: f64 = 1e-3;
 /// Axes meet where half of them pass the focus within so much of their camera's distance from it.
 const MEET: f64 = 0.2;
 /// Another reading has to be better by so much.

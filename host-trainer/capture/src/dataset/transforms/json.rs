@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use glam::{DMat3, DVec3};
 use serde::Deserialize;
 
 use crate::dataset::named_path::NamedPath;
@@ -79,6 +80,20 @@ impl Frame {
         Self { file_path, name, transform_matrix, mask_path: None, own }
     }
 
+    /// The same of a matrix in OpenCV's axes: y and z turn.
+    pub(in crate::dataset) fn of_opencv(file_path: String, mut rows: Vec<Vec<f64>>, own: Intrinsics) -> Self {
+        for row in rows.iter_mut().take(3) {
+            row.iter_mut().skip(1).take(2).for_each(|number| *number = -*number);
+        }
+        Self::new(file_path, &rows, own)
+    }
+
+    /// The same of the rotation from camera to world, OpenGL axes, and of the camera's place.
+    pub(in crate::dataset) fn of_pose(file_path: String, to_world: DMat3, centre: DVec3, own: Intrinsics) -> Self {
+        let row = |i: usize| to_world.row(i).to_array().into_iter().chain([centre[i]]).collect();
+        Self::new(file_path, &[row(0), row(1), row(2)], own)
+    }
+
     /// The path of the image as the file gives it.
     pub(in crate::dataset) fn path(&self) -> NamedPath<'_> {
         NamedPath::new(&self.file_path)
@@ -101,7 +116,7 @@ impl Frame {
 /// [`DatasetError::Read`], [`DatasetError::Transforms`], [`DatasetError::FieldOfView`] or [`DatasetError::NoFocal`],
 /// naming the file.
 pub(in crate::dataset) fn read_transforms(path: &Path) -> Result<Transforms, DatasetError> {
-    let text = text_file::read(path).map_err(|source| DatasetError::of_reading(path, source))?;
+    let text = text_file::read(path)?;
     let transforms = non_finite::read(&text, parse).map_err(|source| DatasetError::of_transforms(path, source))?;
     let angle = transforms.shared.camera_angle_x;
     if let Some(found) = angle.filter(|&angle| !(angle > 0.0 && angle < std::f64::consts::PI)) {

@@ -4,11 +4,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use pocketsplat_capture::dataset::PHOTOGRAPH_EXTENSIONS;
 use pocketsplat_files::{closed_folder, shell_word, shown};
 
-use super::kinds::{
-    AS_THEY_ARE, Kind, Treatment, extension, films_in, kind_of, photographs_in, stem, with_photographs_below,
-};
+use super::kinds::{Kind, Treatment, extension, films_in, kind_of, photographs_in, stem, with_photographs_below};
 use super::programs::{FFMPEG, FFPROBE, HEIF_CONVERT, HEIF_DEC, Needed};
 
 /// A photograph that is given.
@@ -112,7 +111,7 @@ fn named(found: Vec<(PathBuf, Treatment)>) -> Result<Vec<Photograph>> {
     for (path, treatment) in found {
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         let is_converted = treatment != Treatment::Copied;
-        let has_own_name = !is_converted && AS_THEY_ARE.contains(&extension(&name).as_str());
+        let has_own_name = !is_converted && PHOTOGRAPH_EXTENSIONS.contains(&extension(&name).as_str());
         let name = if has_own_name { name } else { format!("{}.jpg", stem(&name)) };
         if name.contains(['\n', '\r', char::REPLACEMENT_CHARACTER]) {
             bail!("the name of `{}` is no text on one line, which COLMAP needs; rename the file", shown(&path));

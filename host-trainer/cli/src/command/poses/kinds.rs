@@ -3,18 +3,11 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use pocketsplat_capture::dataset::{FILM_EXTENSIONS, PHOTOGRAPH_EXTENSIONS, PHOTOGRAPH_FOLDERS, TELEPHONE_EXTENSIONS};
 use pocketsplat_files::{FileKind, shown};
 
 use crate::say::say;
 
-/// Folders that photographs are kept in, the one given last.
-const FOLDERS: [&str; 5] = ["images", "input", "rgb", "photos", "."];
-/// Extensions of films, for those whose first bytes say nothing.
-const FILMS: [&str; 5] = ["mp4", "mov", "mkv", "avi", "webm"];
-/// Extensions of photographs that are taken as they are.
-pub(super) const AS_THEY_ARE: [&str; 4] = ["png", "jpg", "jpeg", "webp"];
-/// Extensions of those that are converted.
-const CONVERTED: [&str; 3] = ["heic", "heif", "avif"];
 /// What becomes of a photograph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Treatment {
@@ -46,12 +39,12 @@ pub(super) fn stem(name: &str) -> &str {
 
 fn is_called_photograph(path: &Path) -> bool {
     let extension = extension(&path.to_string_lossy());
-    AS_THEY_ARE.into_iter().chain(CONVERTED).any(|name| name == extension)
+    PHOTOGRAPH_EXTENSIONS.into_iter().chain(TELEPHONE_EXTENSIONS).any(|name| name == extension)
 }
 
 /// By its first bytes; by its name where these say nothing.
 pub(super) fn kind_of(path: &Path) -> Option<Kind> {
-    let is_film = FILMS.contains(&extension(&path.file_name()?.to_string_lossy()).as_str());
+    let is_film = FILM_EXTENSIONS.contains(&extension(&path.file_name()?.to_string_lossy()).as_str());
     match FileKind::of_file(path).ok().flatten() {
         Some(FileKind::Png | FileKind::Jpeg | FileKind::WebP) => Some(Kind::Photograph(Treatment::Copied)),
         Some(FileKind::Heic) => Some(Kind::Photograph(Treatment::Heif)),
@@ -102,7 +95,7 @@ pub(super) fn films_in(folder: &Path) -> Vec<PathBuf> {
 /// The photographs of a folder, or of the first folder in it that has some; and the pictures there that are of other formats. Says which
 /// files are called photographs and are none.
 pub(super) fn photographs_in(folder: &Path) -> (Vec<(PathBuf, Treatment)>, Vec<PathBuf>) {
-    for name in FOLDERS {
+    for name in PHOTOGRAPH_FOLDERS {
         let folder = if name == "." { folder.to_owned() } else { folder.join(name) };
         let (mut photographs, mut foreign, mut damaged) = (Vec::new(), Vec::new(), Vec::new());
         for path in files_of(&folder) {

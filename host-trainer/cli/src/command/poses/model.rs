@@ -4,7 +4,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use pocketsplat_capture::dataset::MAX_FOCAL_RATIO;
+use pocketsplat_capture::dataset::{
+    MAX_FOCAL_RATIO, colmap_focal_lengths_px, colmap_posed_names, colmap_reprojection_errors_px,
+};
 
 /// A model of some of the photographs.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,11 +28,12 @@ impl Model {
             fs::read(&path).with_context(|| format!("could not read {}", path.display()))
         };
         let cut = || format!("the model in {} is cut; give the same command with --overwrite", folder.display());
-        let mut names = names_in(&bytes("images.bin")?).with_context(cut)?;
+        let mut names = colmap_posed_names(&bytes("images.bin")?).with_context(cut)?;
         names.sort_unstable();
-        let errors = errors_in(&bytes("points3D.bin")?).with_context(cut)?;
+        let errors = colmap_reprojection_errors_px(&bytes("points3D.bin")?).with_context(cut)?;
         let error_px = (!errors.is_empty()).then(|| errors.iter().sum::<f64>() / errors.len() as f64);
-        let focal_ratio = focal_ratio_in(&bytes("cameras.bin")?).with_context(cut)?;
+        let focal_px = colmap_focal_lengths_px(&bytes("cameras.bin")?).with_context(cut)?;
+        let focal_ratio = focal_px.iter().map(|[x, y]| (x / y).max(y / x)).fold(1.0, f64::max);
         Ok(Self { folder: folder.to_owned(), names, n_points: errors.len(), error_px, focal_ratio })
     }
 
@@ -58,88 +61,6 @@ pub(super) fn keep(models: &[Model], sparse: &Path) -> Result<()> {
         models.iter().enumerate().try_for_each(|(i, model)| fs::rename(&model.folder, sparse.join(i.to_string())))
     };
     moved().with_context(|| format!("could not move the models to {}", sparse.display()))
-}
-
-/// Bytes that are read from the front.
-struct Bytes<'a>(&'a [u8]);
-
-impl<'a> Bytes<'a> {
-    fn take(&mut self, n: usize) -> Option<&'a [u8]> {
-        let (taken, rest) = self.0.split_at_checked(n)?;
-        self.0 = rest;
-        Some(taken)
-    }
-
-    fn count(&mut self) -> Option<usize> {
-        let bytes = self.take(8)?.try_into().ok()?;
-        usize::try_from(u64::from_le_bytes(bytes)).ok()
-    }
-
-    fn float(&mut self) -> Option<f64> {
-        Some(f64::from_le_bytes(self.take(8)?.try_into().ok()?))
-    }
-
-    fn name(&mut self) -> Option<String> {
-        let n = self.0.iter().position(|&byte| byte == 0)?;
-        let name = String::from_utf8_lossy(self.take(n)?).into_owned();
-        self.take(1)?;
-        Some(name)
-    }
-}
-
-/// The names in `images.bin`: a count; of each image a number (4 bytes), rotation and translation (7 floats), the camera (4 bytes),
-/// its name, ended by 0, and its features, counted (24 bytes each).
-fn names_in(bytes: &[u8]) -> Option<Vec<String>> {
-    let mut bytes = Bytes(bytes);
-    let n = bytes.count()?;
-    let image = |_| {
-        bytes.take(4 + 7 * 8 + 4)?;
-        let name = bytes.name()?;
-        let n_features = bytes.count()?;
-        bytes.take(n_features.checked_mul(24)?)?;
-        Some(name)
-    };
-    (0..n).map(image).collect()
-}
-
-/// The errors of reprojection in `points3D.bin`, pixels: a count; of each point a number (8 bytes), place (3 floats), colour (3 bytes),
-/// its error, and where it is seen, counted (8 bytes each).
-fn errors_in(bytes: &[u8]) -> Option<Vec<f64>> {
-    let mut bytes = Bytes(bytes);
-    let n = bytes.count()?;
-    let point = |_| {
-        bytes.take(8 + 3 * 8 + 3)?;
-        let error = bytes.float()?;
-        let n_seen = bytes.count()?;
-        bytes.take(n_seen.checked_mul(8)?)?;
-        Some(error)
-    };
-    (0..n).map(point).collect()
-}
-
-/// The largest quotient of two focal lengths in `cameras.bin`: a count; of each camera a number and its model (4 bytes each), width and
-/// height (8 bytes each), and its parameters: four of SIMPLE_RADIAL, whose focal length is one, and eight of OPENCV, two focal lengths first.
-fn focal_ratio_in(bytes: &[u8]) -> Option<f64> {
-    const SIMPLE_RADIAL: u32 = 2;
-    const OPENCV: u32 = 4;
-    let mut bytes = Bytes(bytes);
-    let n = bytes.count()?;
-    let camera = |_| {
-        bytes.take(4)?;
-        let model = u32::from_le_bytes(bytes.take(4)?.try_into().ok()?);
-        bytes.take(2 * 8)?;
-        let first = bytes.float()?;
-        match model {
-            SIMPLE_RADIAL => bytes.take(3 * 8).map(|_| 1.0),
-            OPENCV => {
-                let second = bytes.float()?;
-                bytes.take(6 * 8)?;
-                Some((first / second).max(second / first))
-            }
-            _ => None,
-        }
-    };
-    (0..n).map(camera).try_fold(1.0, |most: f64, ratio| Some(most.max(ratio?)))
 }
 
 #[cfg(test)]

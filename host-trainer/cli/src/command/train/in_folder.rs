@@ -9,7 +9,7 @@ use pocketsplat_files::{Output, shell_word};
 use pocketsplat_kernels::step::SharedDevice;
 use pocketsplat_trainer::encode::EncodedSizes;
 use pocketsplat_trainer::train::Trainer;
-use pocketsplat_trainer::train::run::{Ending, Interval, Method, Newest, Run, RunError, RunFolder};
+use pocketsplat_trainer::train::run::{Ending, Interval, Method, Resumed, Run, RunError, RunFolder};
 
 use super::loading::keep_points;
 use super::result::{TrainResult, write_bundle};
@@ -67,7 +67,7 @@ impl GoesOn {
     }
 
     /// As a clause.
-    pub(super) fn said(self, run: &Path) -> String {
+    pub(crate) fn said(self, run: &Path) -> String {
         match self {
             Self::Resume(device) => {
                 let device = if device == DeviceChoice::Cpu { String::new() } else { format!(" --device {device}") };
@@ -189,7 +189,7 @@ pub(super) fn resumed<'a, M: Method>(
     capture: &'a Capture,
     ready: impl FnOnce(&mut Run<'a, M>) -> Result<()>,
 ) -> Result<Run<'a, M>> {
-    let Some(Newest { restored, passed_over }) = folder.resume(capture)? else {
+    let Some(Resumed { restored, passed_over }) = folder.resume(capture)? else {
         say!("the run in {} has no checkpoint yet; it begins anew", folder.path().display());
         return Ok(Run::new(capture, config)?);
     };

@@ -49,7 +49,7 @@ impl<'f> Dump<'f> {
     /// The bytes up to where a section or a chunk may begin.
     pub(super) fn padding(&mut self) {
         let n = self.position.next_multiple_of(ALIGNMENT as usize) - self.position;
-        self.array::<1, _>("padding", n, |[byte]| byte);
+        self.array("padding", n, u8::from_le_bytes);
     }
 
     /// Leaves `n_bytes` out and says so.

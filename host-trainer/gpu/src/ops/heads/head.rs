@@ -70,7 +70,7 @@ pub struct Head {
     parts: Buffer<f32>,
 }
 
-/// What a product is told; see `head/product.wgsl`.
+/// What a product is told, and the sum of its parts; `head/parameters.wgsl` has the same.
 #[derive(Clone, Copy, Default, Pod, Zeroable)]
 #[repr(C)]
 struct Product {
@@ -93,15 +93,17 @@ impl Head {
     /// # Errors
     /// As [`Buffer::zeros`].
     pub fn new(gpu: &Gpu) -> Result<Self, GpuError> {
+        const PARAMETERS: &str = include_str!("head/parameters.wgsl");
         const PRODUCT: &str = include_str!("head/product.wgsl");
-        let kernel = |name, source| Kernel::new(gpu, name, &[GROUPS, PRODUCT, source]);
-        let back = |name, source| Kernel::new(gpu, name, &[GROUPS, PRODUCT, include_str!("head/back.wgsl"), source]);
+        const BACK: &str = include_str!("head/back.wgsl");
+        let kernel = |name, source| Kernel::new(gpu, name, &[GROUPS, PARAMETERS, PRODUCT, source]);
+        let back = |name, source| Kernel::new(gpu, name, &[GROUPS, PARAMETERS, PRODUCT, BACK, source]);
         Ok(Self {
             layer: kernel("head: layer", include_str!("head/layer.wgsl")),
             to_hidden: back("head: to hidden", include_str!("head/to_hidden.wgsl")),
             to_input: back("head: to input", include_str!("head/to_input.wgsl")),
             parts_of_weights: kernel("head: weights", include_str!("head/weights.wgsl")),
-            sum: Kernel::new(gpu, "head: sum", &[GROUPS, include_str!("head/sum.wgsl")]),
+            sum: Kernel::new(gpu, "head: sum", &[GROUPS, PARAMETERS, include_str!("head/sum.wgsl")]),
             parts: Buffer::zeros(gpu, "parts of gradients of weights", 1)?,
         })
     }

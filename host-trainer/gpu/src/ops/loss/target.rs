@@ -1,7 +1,5 @@
 //! The photograph that a step compares with, kept as 8 bit: [`pocketsplat_kernels::step::TargetView`].
 
-use bytemuck::{Pod, Zeroable};
-
 use crate::{Buffer, Commands, GROUPS, Gpu, GpuError, Kernel};
 
 /// A photograph and where it shows the scene.
@@ -48,12 +46,6 @@ pub struct ClearMasked {
     clear: Kernel,
 }
 
-#[derive(Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-struct Parameters {
-    n_pixels: u32,
-}
-
 impl ClearMasked {
     /// Compiles the kernel.
     pub fn new(gpu: &Gpu) -> Self {
@@ -63,8 +55,8 @@ impl ClearMasked {
     /// Makes the pixels of `planes`, `[3, height, width]`, that do not count zero.
     pub fn run(&self, commands: &mut Commands<'_>, target: &Target, planes: &Buffer<f32>) {
         if !target.is_whole() {
-            let parameters = Parameters { n_pixels: target.pixels.len() as u32 };
-            commands.run_items(&self.clear, &parameters, &[&target.pixels, planes], planes.len());
+            let n_pixels = target.pixels.len() as u32;
+            commands.run_items(&self.clear, &n_pixels, &[&target.pixels, planes], planes.len());
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The detail residual: one small network shared by all Gaussians that adds to a colour what the anchor's feature says about it.
 
+use super::head::add_rows;
 use super::matmul::{Matrix, multiply};
 use super::neural_gaussians::{Gaussian, Source};
 use crate::real::Real;
@@ -77,11 +78,7 @@ pub fn backward<R: Real>(
     let d_residuals: Vec<R> = d_gaussians.iter().flat_map(|gaussian| gaussian.colour).collect();
     let d_out = Matrix::new(&d_residuals, m, 3);
     multiply(d_out.t(), Matrix::new(&kept.hidden, m, h), true, &mut d_head.w2);
-    for d in d_residuals.as_chunks::<3>().0 {
-        for (sum, d) in d_head.b2.iter_mut().zip(d) {
-            *sum += *d;
-        }
-    }
+    add_rows(&d_residuals, &mut d_head.b2);
     let mut d_hidden = vec![R::ZERO; m * h];
     multiply(d_out, Matrix::new(&head.w2, 3, h), false, &mut d_hidden);
     let d_sums = &mut kept.sums;
@@ -94,11 +91,7 @@ pub fn backward<R: Real>(
             *sum += *d;
         }
     }
-    for row in d_sums.chunks_exact(h) {
-        for (sum, d) in d_head.b1.iter_mut().zip(row) {
-            *sum += *d;
-        }
-    }
+    add_rows(d_sums, &mut d_head.b1);
     let mut d_by_feature = vec![R::ZERO; h * f];
     multiply(Matrix::new(d_sums, n, h).t(), Matrix::new(features, n, f), false, &mut d_by_feature);
     let mut d_by_colour = vec![R::ZERO; h * 3];

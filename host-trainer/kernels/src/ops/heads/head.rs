@@ -55,7 +55,7 @@ pub fn backward<R: Real>(
 }
 
 /// `sum[j] += Σ_i rows[i, j]`.
-fn add_rows<R: Real>(rows: &[R], sum: &mut [R]) {
+pub(super) fn add_rows<R: Real>(rows: &[R], sum: &mut [R]) {
     for row in rows.chunks_exact(sum.len()) {
         for (s, r) in sum.iter_mut().zip(row) {
             *s += *r;

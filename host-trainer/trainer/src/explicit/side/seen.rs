@@ -8,7 +8,6 @@ use pocketsplat_gaussians::{Degree, Gaussians};
 use crate::explicit::Cloud;
 use crate::explicit::step::draw;
 use pocketsplat_kernels::ops::Pinhole;
-use pocketsplat_kernels::ops::image::rasterise::TiledImage;
 use pocketsplat_kernels::ops::simd::Level;
 
 /// A Gaussian is seen where this share of its light comes through: the rest is its neighbours', which overlap on any surface.
@@ -38,17 +37,14 @@ impl Looker {
         Self { level: Level::detect(), cloud, weights, total }
     }
 
-    /// The light of a Gaussian is Σ α·T over the pixels, the derivative of the image's sum by its colour; what nothing hides has 2π·o/√|Σ'⁻¹|.
+    /// The light of a Gaussian is Σ α·T over the pixels; what nothing hides has 2π·o/√|Σ'⁻¹|.
     pub(super) fn look(&self, camera: &Camera) -> Sight {
         let pinhole = Pinhole::new(camera);
         let [width, height] = pinhole.size_px;
         let drawing = draw(self.level, &self.cloud, &pinhole, [0.0; 3]);
-        let mut ones = vec![0.0f32; 3 * width * height];
-        ones[..width * height].fill(1.0);
-        let d_image = TiledImage::from_planes(&ones, pinhole.size_px);
-        let d_splats = drawing.light(self.level, &d_image);
+        let lights = drawing.light(self.level, pinhole.size_px);
         let mut shares = Vec::new();
-        for ((index, splat), light) in drawing.drawn.iter().zip(&drawing.splats).zip(d_splats) {
+        for ((index, splat), light) in drawing.drawn.iter().zip(&drawing.splats).zip(lights) {
             let [x, y] = splat.mean_px;
             if x >= 0.0 && y >= 0.0 && x < width as f32 && y < height as f32 {
                 let whole =

@@ -85,7 +85,7 @@ fn begin(mlp: &mut Head<f32>, rng: &mut ChaCha8Rng) {
 /// A model for anchors that follow anchors.
 ///
 /// * `n`: anchors that its size is for.
-pub fn initial_levels(
+fn initial_levels(
     scene: &Scene<f32>,
     n: usize,
     base_steps: [f32; N_GROUPS],

@@ -90,7 +90,7 @@ impl Default for Pruning {
 }
 
 /// Shares of [`Pruning::rate`] that steps leave out under [`Form::Tiered`]; of 40 % they are 40, 30, 20, 10 and 5 %.
-pub const TIER_SHARES: [f64; 5] = [1.0, 0.75, 0.5, 0.25, 0.125];
+const TIER_SHARES: [f64; 5] = [1.0, 0.75, 0.5, 0.25, 0.125];
 /// Draws of an iteration's stream: whether it takes all anchors, and if not, which tier.
 const WHOLE_DRAW: u32 = 0x5449_4552;
 const TIER_DRAW: u32 = WHOLE_DRAW + 1;
@@ -108,7 +108,7 @@ impl Pruning {
     /// Those of the pool are shuffled, all others follow their scores; equal scores keep their order.
     ///
     /// * `scores`: `[n]`, low goes first.
-    pub fn prune_ranks(&self, scores: &[f32], rng: &mut ChaCha8Rng) -> Vec<f32> {
+    fn prune_ranks(&self, scores: &[f32], rng: &mut ChaCha8Rng) -> Vec<f32> {
         let n = scores.len();
         let mut order: Vec<usize> = (0..n).collect();
         order.sort_by(|a, b| scores[*a].total_cmp(&scores[*b]));

@@ -20,8 +20,8 @@ mod trainer;
 pub mod watchdog;
 
 pub use folder::{
-    Ending, Interval, LoggedStep, Newest, ProgressLog, Resumable, Resumed, RunError, RunFolder, fork, is_file_of_run,
-    newest_preview, photographs_in, points_in,
+    Ending, Interval, LoggedStep, ProgressLog, Resumed, RunError, RunFolder, fork, is_file_of_run, newest_preview,
+    photographs_in, points_in,
 };
 pub use learned::Learned;
 pub use method::{Method, Run};

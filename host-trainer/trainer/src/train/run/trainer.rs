@@ -141,7 +141,7 @@ impl<'a> Trainer<'a> {
 
     /// Has steps computed by `device`, or on the CPU again; between runs, or after [`Self::fetch`].
     ///
-    /// A device holds the scene of one run at a time.
+    /// A device holds the scene of one run and the photographs of one capture at a time.
     pub fn set_device(&mut self, device: Option<SharedDevice<f32>>) {
         self.machine.device.workspace.set_device(device);
     }

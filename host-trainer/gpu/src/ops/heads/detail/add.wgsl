@@ -2,12 +2,8 @@
 @group(0) @binding(1) var<storage, read_write> gaussians: array<Gaussian>;
 
 @compute @workgroup_size(256)
-fn add(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let slot = item_of(group, n_groups, thread);
+fn add(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let slot = item_of(group, thread);
     if slot >= parameters.n_items || gaussians[slot].opacity <= 0.0 {
         return;
     }

@@ -13,12 +13,8 @@ fn right_of(depth: u32, column: u32) -> f32 {
 }
 
 @compute @workgroup_size(256)
-fn layer(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let tile = tile_of(group_of(group, n_groups), thread);
+fn layer(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let tile = tile_of(group_of(group), thread);
     let sums = product(tile, thread, 0u, parameters.depth);
     if tile.column >= parameters.n_columns {
         return;

@@ -5,19 +5,6 @@ const TILE_ROWS: u32 = 64u;
 const TILE_COLUMNS: u32 = 16u;
 const TILE_DEPTH: u32 = 16u;
 
-struct Parameters {
-    n_rows: u32,
-    n_columns: u32,
-    depth: u32,
-    input_stride: u32,
-    first_weight: u32,
-    first_bias: u32,
-    is_rectified: u32,
-    part_rows: u32,
-    n_parts: u32,
-}
-
-var<immediate> parameters: Parameters;
 // One value of padding a row: the threads of a row of the tile write one below the other.
 var<workgroup> left: array<f32, 1040>;
 var<workgroup> right: array<f32, 256>;

@@ -1,29 +1,11 @@
 // Adds the parts of a layer's gradients one after the other.
 
-struct Parameters {
-    n_rows: u32,
-    n_columns: u32,
-    depth: u32,
-    input_stride: u32,
-    first_weight: u32,
-    first_bias: u32,
-    is_rectified: u32,
-    part_rows: u32,
-    n_parts: u32,
-}
-
 @group(0) @binding(0) var<storage, read> parts: array<f32>;
 @group(0) @binding(1) var<storage, read_write> d_weights: array<f32>;
 
-var<immediate> parameters: Parameters;
-
 @compute @workgroup_size(256)
-fn sum(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let i = item_of(group, n_groups, thread);
+fn sum(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let i = item_of(group, thread);
     let n = parameters.n_rows * parameters.n_columns;
     if i >= n {
         return;

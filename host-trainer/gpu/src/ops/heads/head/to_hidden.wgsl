@@ -4,12 +4,8 @@
 @group(0) @binding(3) var<storage, read_write> d_hidden: array<f32>;
 
 @compute @workgroup_size(256)
-fn to_hidden(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let tile = tile_of(group_of(group, n_groups), thread);
+fn to_hidden(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let tile = tile_of(group_of(group), thread);
     let sums = product(tile, thread, 0u, parameters.depth);
     for (var i = 0u; i < 4u; i++) {
         let row = tile.first_row + 16u * i;

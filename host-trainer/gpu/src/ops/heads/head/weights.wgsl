@@ -16,12 +16,8 @@ fn right_of(depth: u32, column: u32) -> f32 {
 }
 
 @compute @workgroup_size(256)
-fn weights(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let tile = tile_of(group_of(group, n_groups), thread);
+fn weights(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let tile = tile_of(group_of(group), thread);
     let begin = tile.part * parameters.part_rows;
     let end = min(begin + parameters.part_rows, parameters.depth);
     let sums = product(tile, thread, begin, end);

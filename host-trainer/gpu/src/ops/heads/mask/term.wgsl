@@ -11,12 +11,8 @@ var<immediate> parameters: Parameters;
 var<workgroup> sums: array<f32, GROUP_THREADS>;
 
 @compute @workgroup_size(256)
-fn term(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let i = item_of(group, n_groups, thread);
+fn term(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let i = item_of(group, thread);
     var open = 0.0;
     if i < parameters.n_logits {
         open = sigmoid_of(logits[i]);
@@ -30,6 +26,6 @@ fn term(
         }
     }
     if thread == 0u && i < parameters.n_logits {
-        parts[group_of(group, n_groups)] = sums[0];
+        parts[group_of(group)] = sums[0];
     }
 }

@@ -10,12 +10,8 @@
 @group(0) @binding(7) var<storage, read_write> d_mask_logits: array<f32>;
 
 @compute @workgroup_size(256)
-fn backward_anchors(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let row = item_of(group, n_groups, thread);
+fn backward_anchors(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let row = item_of(group, thread);
     if row >= parameters.n_items {
         return;
     }

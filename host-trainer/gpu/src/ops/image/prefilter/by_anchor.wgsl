@@ -1,10 +1,6 @@
 @compute @workgroup_size(256)
-fn by_anchor(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let anchor = item_of(group, n_groups, thread);
+fn by_anchor(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let anchor = item_of(group, thread);
     if anchor >= parameters.n_anchors {
         return;
     }

@@ -9,12 +9,8 @@ var<immediate> n_pixels: u32;
 var<workgroup> sums: array<vec3<f32>, GROUP_THREADS>;
 
 @compute @workgroup_size(256)
-fn background(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let i = item_of(group, n_groups, thread);
+fn background(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let i = item_of(group, thread);
     var d = vec3(0.0);
     if i < n_pixels {
         d = transmittance[i] * vec3(d_image[i], d_image[n_pixels + i], d_image[2u * n_pixels + i]);
@@ -26,7 +22,7 @@ fn background(
             sums[thread] += sums[thread + width];
         }
     }
-    let at = 3u * group_of(group, n_groups);
+    let at = 3u * group_of(group);
     if thread < 3u && i - thread < n_pixels {
         parts[at + thread] = sums[0][thread];
     }

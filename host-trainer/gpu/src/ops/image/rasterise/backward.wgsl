@@ -26,12 +26,8 @@ var<workgroup> n_live_read: u32;
 var<workgroup> column_sums: array<f32, AT_ONCE * N_NUMBERS * TILE_PX>;
 
 @compute @workgroup_size(256)
-fn backward(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let tile = group_of(group, n_groups);
+fn backward(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let tile = group_of(group);
     if tile >= parameters.n_tiles {
         return;
     }

@@ -12,12 +12,8 @@ var<workgroup> n_live: atomic<u32>;
 var<workgroup> n_live_read: u32;
 
 @compute @workgroup_size(256)
-fn forward(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let tile = group_of(group, n_groups);
+fn forward(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let tile = group_of(group);
     if tile >= parameters.n_tiles {
         return;
     }

@@ -18,12 +18,8 @@ struct Parameters {
 var<immediate> parameters: Parameters;
 
 @compute @workgroup_size(256)
-fn add(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let row = item_of(group, n_groups, thread);
+fn add(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let row = item_of(group, thread);
     if row >= parameters.n_anchors {
         return;
     }

@@ -10,16 +10,12 @@ var<immediate> parameters: Parameters;
 var<workgroup> n_of_group: atomic<u32>;
 
 @compute @workgroup_size(256)
-fn count(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
+fn count(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
     if thread == 0u {
         atomicStore(&n_of_group, 0u);
     }
     workgroupBarrier();
-    let slot = item_of(group, n_groups, thread);
+    let slot = item_of(group, thread);
     if slot < parameters.n_slots && footprints[slot].depth > 0.0 {
         atomicAdd(&n_of_group, 1u);
     }

@@ -5,12 +5,8 @@
 @group(0) @binding(4) var<storage, read_write> n_tiles: array<u32>;
 
 @compute @workgroup_size(256)
-fn measure(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let slot = item_of(group, n_groups, thread);
+fn measure(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let slot = item_of(group, thread);
     if slot >= parameters.n_items {
         return;
     }

@@ -3,12 +3,8 @@
 
 // Item i writes the starts of the tiles after that of pair i - 1, up to that of pair i.
 @compute @workgroup_size(256)
-fn range(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let i = item_of(group, n_groups, thread);
+fn range(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let i = item_of(group, thread);
     if i > parameters.n_items {
         return;
     }

@@ -15,12 +15,8 @@ var<workgroup> products: array<vec3<f32>, GROUP_THREADS>;
 var<workgroup> squares: array<vec3<f32>, GROUP_THREADS>;
 
 @compute @workgroup_size(256)
-fn sums(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let i = item_of(group, n_groups, thread);
+fn sums(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let i = item_of(group, thread);
     let n = parameters.n_pixels;
     products[thread] = vec3(0.0);
     squares[thread] = vec3(0.0);
@@ -40,7 +36,7 @@ fn sums(
         }
     }
     if thread == 0u && i < n {
-        let at = 6u * group_of(group, n_groups);
+        let at = 6u * group_of(group);
         for (var c = 0u; c < 3u; c++) {
             parts[at + c] = products[0][c];
             parts[at + 3u + c] = squares[0][c];

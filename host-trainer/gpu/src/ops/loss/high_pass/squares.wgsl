@@ -4,12 +4,8 @@
 var<workgroup> sums: array<f32, GROUP_THREADS>;
 
 @compute @workgroup_size(256)
-fn squares(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let i = item_of(group, n_groups, thread);
+fn squares(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let i = item_of(group, thread);
     var own = 0.0;
     if i < n_values() {
         own = high_frequencies[i] * high_frequencies[i];
@@ -22,6 +18,6 @@ fn squares(
         }
     }
     if thread == 0u && i < n_values() {
-        parts[group_of(group, n_groups)] = sums[0];
+        parts[group_of(group)] = sums[0];
     }
 }

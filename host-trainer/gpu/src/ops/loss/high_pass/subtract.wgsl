@@ -3,12 +3,8 @@
 @group(0) @binding(2) var<storage, read_write> difference: array<f32>;
 
 @compute @workgroup_size(256)
-fn subtract(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let i = item_of(group, n_groups, thread);
+fn subtract(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let i = item_of(group, thread);
     if i < n_values() {
         let n_pixels = parameters.size_px[0] * parameters.size_px[1];
         let channel = i / n_pixels;

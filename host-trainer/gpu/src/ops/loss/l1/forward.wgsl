@@ -6,12 +6,8 @@
 var<workgroup> sums: array<vec2<f32>, GROUP_THREADS>;
 
 @compute @workgroup_size(256)
-fn forward(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let i = item_of(group, n_groups, thread);
+fn forward(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let i = item_of(group, thread);
     let n_values = 3u * parameters.n_pixels;
     var d = 0.0;
     if i < n_values {
@@ -25,7 +21,7 @@ fn forward(
         }
     }
     if thread == 0u && i < n_values {
-        let at = 2u * group_of(group, n_groups);
+        let at = 2u * group_of(group);
         parts[at] = sums[0].x;
         parts[at + 1u] = sums[0].y;
     }

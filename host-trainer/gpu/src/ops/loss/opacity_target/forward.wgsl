@@ -4,12 +4,8 @@
 var<workgroup> sums: array<f32, GROUP_THREADS>;
 
 @compute @workgroup_size(256)
-fn forward(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let slot = item_of(group, n_groups, thread);
+fn forward(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let slot = item_of(group, thread);
     var own = 0.0;
     if slot < parameters.n_slots {
         own = gaussians[slot].opacity;
@@ -22,6 +18,6 @@ fn forward(
         }
     }
     if thread == 0u && slot < parameters.n_slots {
-        parts[group_of(group, n_groups)] = sums[0];
+        parts[group_of(group)] = sums[0];
     }
 }

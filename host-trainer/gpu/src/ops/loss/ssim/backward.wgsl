@@ -7,12 +7,8 @@ var<workgroup> values: array<array<f32, 3>, PADDED * PADDED>;
 var<workgroup> across: array<array<f32, 3>, PADDED * EDGE>;
 
 @compute @workgroup_size(256)
-fn backward(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let place = place_of(group_of(group, n_groups));
+fn backward(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let place = place_of(group_of(group));
     if place.channel >= 3u {
         return;
     }

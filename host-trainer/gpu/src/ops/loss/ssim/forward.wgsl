@@ -14,12 +14,8 @@ var<workgroup> across: array<vec4<f32>, PADDED * EDGE>;
 var<workgroup> sums: array<f32, GROUP_THREADS>;
 
 @compute @workgroup_size(256)
-fn forward(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let place = place_of(group_of(group, n_groups));
+fn forward(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let place = place_of(group_of(group));
     if place.channel >= 3u {
         return;
     }
@@ -78,6 +74,6 @@ fn forward(
         }
     }
     if thread == 0u {
-        parts[group_of(group, n_groups)] = sums[0];
+        parts[group_of(group)] = sums[0];
     }
 }

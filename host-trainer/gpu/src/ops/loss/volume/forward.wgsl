@@ -5,12 +5,8 @@
 var<workgroup> sums: array<vec2<f32>, GROUP_THREADS>;
 
 @compute @workgroup_size(256)
-fn forward(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let slot = item_of(group, n_groups, thread);
+fn forward(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let slot = item_of(group, thread);
     var own = vec2<f32>(0.0);
     if slot < parameters.n_slots && gaussians[slot].opacity > 0.0 {
         let scale = gaussians[slot].scale;
@@ -24,7 +20,7 @@ fn forward(
         }
     }
     if thread == 0u && slot < parameters.n_slots {
-        let part = group_of(group, n_groups);
+        let part = group_of(group);
         parts[2u * part] = sums[0].x;
         parts[2u * part + 1u] = sums[0].y;
     }

@@ -10,12 +10,8 @@ var<immediate> n_items: u32;
 const NO_ROW: u32 = 0xffffffffu;
 
 @compute @workgroup_size(256)
-fn compact(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let item = item_of(group, n_groups, thread);
+fn compact(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let item = item_of(group, thread);
     if item >= n_items {
         return;
     }

@@ -3,12 +3,8 @@
 @group(0) @binding(2) var<storage, read_write> values: array<f32>;
 
 @compute @workgroup_size(256)
-fn add_back(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let i = item_of(group, n_groups, thread);
+fn add_back(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let i = item_of(group, thread);
     if i >= parameters.n_values {
         return;
     }

@@ -6,17 +6,13 @@
 var<workgroup> n_of_digit: array<atomic<u32>, N_DIGITS>;
 
 @compute @workgroup_size(256)
-fn count(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let block = group_of(group, n_groups);
+fn count(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let block = group_of(group);
     if thread < N_DIGITS {
         atomicStore(&n_of_digit[thread], 0u);
     }
     workgroupBarrier();
-    let first = item_of(group, n_groups, thread) * PER_THREAD;
+    let first = item_of(group, thread) * PER_THREAD;
     for (var i = first; i < min(first + PER_THREAD, parameters.n_pairs); i++) {
         atomicAdd(&n_of_digit[digit_of(keys[i])], 1u);
     }

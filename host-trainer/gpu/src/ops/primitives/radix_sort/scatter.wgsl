@@ -13,13 +13,9 @@ var<workgroup> before: array<u32, HALF * GROUP_THREADS>;
 var<workgroup> partial: array<u32, GROUP_THREADS>;
 
 @compute @workgroup_size(256)
-fn scatter(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let block = group_of(group, n_groups);
-    let first = item_of(group, n_groups, thread) * PER_THREAD;
+fn scatter(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let block = group_of(group);
+    let first = item_of(group, thread) * PER_THREAD;
     let end = min(first + PER_THREAD, parameters.n_pairs);
     for (var d = 0u; d < HALF; d++) {
         before[d * GROUP_THREADS + thread] = 0u;

@@ -8,12 +8,8 @@
 @group(0) @binding(7) var<storage, read_write> d_log2_scales: array<f32>;
 
 @compute @workgroup_size(256)
-fn bits_of_values(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let i = item_of(group, n_groups, thread);
+fn bits_of_values(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let i = item_of(group, thread);
     let c = channel_of(i);
     if c.sample >= parameters.n_sampled {
         return;

@@ -7,12 +7,8 @@
 @group(0) @binding(4) var<storage, read_write> d_outputs: array<f32>;
 
 @compute @workgroup_size(256)
-fn to_exponents(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let item = item_of(group, n_groups, thread);
+fn to_exponents(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let item = item_of(group, thread);
     let sample = item / 3u;
     if sample >= parameters.n_sampled {
         return;

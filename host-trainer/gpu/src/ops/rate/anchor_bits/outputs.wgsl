@@ -6,12 +6,8 @@
 @group(0) @binding(5) var<storage, read_write> d_outputs: array<f32>;
 
 @compute @workgroup_size(256)
-fn to_outputs(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let i = item_of(group, n_groups, thread);
+fn to_outputs(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let i = item_of(group, thread);
     let c = channel_of(i);
     if c.sample >= parameters.n_sampled {
         return;

@@ -7,12 +7,8 @@
 var<workgroup> sums: array<f32, GROUP_THREADS>;
 
 @compute @workgroup_size(256)
-fn to_taps(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let tap = group_of(group, n_groups);
+fn to_taps(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let tap = group_of(group);
     var feature = 1u;
     while feature < parameters.widths[0] && first_tap_of(feature + 1u) <= tap {
         feature++;

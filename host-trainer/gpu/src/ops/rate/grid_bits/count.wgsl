@@ -5,12 +5,8 @@
 var<workgroup> counts: array<u32, GROUP_THREADS>;
 
 @compute @workgroup_size(256)
-fn count(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let i = item_of(group, n_groups, thread);
+fn count(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let i = item_of(group, thread);
     var own = 0u;
     if i < parameters.n_values {
         own = u32(rows[i] >= 0.0);

@@ -14,12 +14,8 @@ const ROWS_PER_GROUP: u32 = GROUP_THREADS / THREADS_PER_ROW;
 var<workgroup> parts: array<vec4<f32>, GROUP_THREADS>;
 
 @compute @workgroup_size(256)
-fn backward(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let grid_row = group_of(group, n_groups) * ROWS_PER_GROUP + thread / THREADS_PER_ROW;
+fn backward(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let grid_row = group_of(group) * ROWS_PER_GROUP + thread / THREADS_PER_ROW;
     let part = thread % THREADS_PER_ROW;
     var sum = vec4<f32>(0.0);
     if grid_row < parameters.n_items {

@@ -10,12 +10,8 @@
 const DROPPED_BITS: u32 = 10u;
 
 @compute @workgroup_size(256)
-fn hidden(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let i = item_of(group, n_groups, thread);
+fn hidden(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let i = item_of(group, thread);
     if i >= parameters.n_items {
         return;
     }

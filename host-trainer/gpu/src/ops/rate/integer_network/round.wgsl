@@ -24,12 +24,8 @@ fn nearest(x: f32) -> f32 {
 }
 
 @compute @workgroup_size(256)
-fn round_row(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let row = item_of(group, n_groups, thread);
+fn round_row(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let row = item_of(group, thread);
     if row >= parameters.n_items {
         return;
     }

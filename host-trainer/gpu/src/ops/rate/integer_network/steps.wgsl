@@ -8,12 +8,8 @@
 var<immediate> n_values: u32;
 
 @compute @workgroup_size(256)
-fn steps_of_exponents(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let i = item_of(group, n_groups, thread);
+fn steps_of_exponents(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let i = item_of(group, thread);
     if i >= n_values {
         return;
     }

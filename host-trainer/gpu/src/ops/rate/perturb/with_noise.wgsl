@@ -4,12 +4,8 @@
 @group(0) @binding(3) var<storage, read> anchors: array<u32>;
 
 @compute @workgroup_size(256)
-fn with_noise(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let i = item_of(group, n_groups, thread);
+fn with_noise(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let i = item_of(group, thread);
     let row = i / parameters.width;
     if row >= parameters.n_rows {
         return;

@@ -12,12 +12,8 @@ struct Parameters {
 var<immediate> parameters: Parameters;
 
 @compute @workgroup_size(256)
-fn mark(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    let row = item_of(group, n_groups, thread);
+fn mark(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let row = item_of(group, thread);
     if row < parameters.n_rows {
         let anchor = anchors[row];
         let draw = uniform_of(branch_of(parameters.stream, anchor), parameters.draw);

@@ -17,7 +17,6 @@ mod error;
 mod files;
 mod previews;
 mod progress_log;
-mod resumable;
 mod store;
 
 #[cfg(test)]
@@ -32,10 +31,9 @@ use std::time::Instant;
 pub use error::RunError;
 pub use previews::newest_preview;
 pub use progress_log::{LoggedStep, ProgressLog};
-pub use resumable::Resumable;
-pub use store::{Newest, Resumed, fork};
+pub use store::{Resumed, fork};
 
-use super::{Observer, Trainer};
+use super::{Method, Observer, Run, Trainer};
 use pocketsplat_files::beside;
 use pocketsplat_kernels::step::StepReport;
 use previews::{PREVIEWS, Previews};
@@ -119,7 +117,12 @@ impl RunFolder {
     ///
     /// # Errors
     /// As [`Self::start`].
-    pub fn start_from(path: &Path, config: &str, overwrite: bool, begun: &impl Resumable) -> Result<Self, RunError> {
+    pub fn start_from(
+        path: &Path,
+        config: &str,
+        overwrite: bool,
+        begun: &Run<'_, impl Method>,
+    ) -> Result<Self, RunError> {
         let folder = Self::cleared(path, overwrite)?;
         files::remove(&path.join(CONFIG))?;
         folder.save(begun)?;
@@ -287,19 +290,19 @@ impl RunFolder {
     ///
     /// # Errors
     /// As [`Self::train`].
-    pub fn drive<R: Resumable>(
+    pub fn drive<'a, M: Method>(
         &mut self,
-        run: &mut R,
+        run: &mut Run<'a, M>,
         interval: Interval,
         stop: &AtomicBool,
-        mut advance: impl FnMut(&mut R) -> Result<LoggedStep, RunError>,
+        mut advance: impl FnMut(&mut Run<'a, M>) -> Result<LoggedStep, RunError>,
     ) -> Result<Ending, RunError> {
         let mut log = ProgressLog::open(&self.path.join(LOG), run)?;
         let (mut saved_at, mut write_s) = (Instant::now(), 0.0);
         let mut saved_iteration = None;
         loop {
             let asked = stop.load(Ordering::Relaxed);
-            let ends = asked || is_done(run);
+            let ends = asked || run.is_done();
             let due = match interval {
                 Interval::Iterations(n) => n > 0 && run.iteration() > 0 && run.iteration().is_multiple_of(n),
                 Interval::Seconds(s) if saved_iteration.is_none() => {
@@ -310,17 +313,17 @@ impl RunFolder {
             let due = due || self.forks_at.contains(&run.iteration());
             if (ends || due) && saved_iteration != Some(run.iteration()) {
                 let started = Instant::now();
-                run.fetch()?;
+                M::fetch(run)?;
                 self.save(run)?;
                 write_s = started.elapsed().as_secs_f64();
                 (saved_at, saved_iteration) = (Instant::now(), Some(run.iteration()));
             }
             if ends {
-                return Ok(if is_done(run) { Ending::Finished } else { Ending::Interrupted });
+                return Ok(if run.is_done() { Ending::Finished } else { Ending::Interrupted });
             }
             let step = advance(run)?;
             if log.is_due(run) {
-                run.fetch()?;
+                M::fetch(run)?;
             }
             log.add(run, &step)?;
         }
@@ -345,8 +348,4 @@ pub fn is_file_of_run(name: &OsStr) -> bool {
 /// Whether it is what a file of a run is called until it is whole.
 fn is_partial(name: &OsStr) -> bool {
     name.to_str().and_then(files::name_when_whole).is_some_and(|name| is_file_of_run(OsStr::new(name)))
-}
-
-fn is_done(run: &impl Resumable) -> bool {
-    run.iteration() >= run.iterations()
 }

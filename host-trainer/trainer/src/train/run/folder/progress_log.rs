@@ -4,7 +4,8 @@ use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use super::{Resumable, RunError, files};
+use super::{RunError, files};
+use crate::train::run::{Method, Run};
 use pocketsplat_kernels::step::coding::RateReport;
 
 const HEADER: &str =
@@ -50,7 +51,7 @@ impl ProgressLog {
     ///
     /// # Errors
     /// [`RunError`] when it cannot be read or written.
-    pub fn open(path: &Path, run: &impl Resumable) -> Result<Self, RunError> {
+    pub fn open(path: &Path, run: &Run<'_, impl Method>) -> Result<Self, RunError> {
         let done = run.iteration();
         let older = match fs::read(path) {
             // A power cut may leave anything.
@@ -70,7 +71,7 @@ impl ProgressLog {
         })?;
         let file = File::options().append(true).open(path).map_err(|source| RunError::io("open", path, source))?;
         let every = (run.iterations() / ROWS).max(1);
-        let n_pixels: f64 = run.largest_px().map(f64::from).iter().product();
+        let n_pixels: f64 = run.capture().largest_px().map(f64::from).iter().product();
         Ok(Self {
             path: path.to_owned(),
             file,
@@ -85,15 +86,15 @@ impl ProgressLog {
     }
 
     /// Whether the run's last iteration ends a row.
-    pub fn is_due(&self, run: &impl Resumable) -> bool {
-        run.iteration().is_multiple_of(self.every) || run.iteration() >= run.iterations()
+    pub fn is_due(&self, run: &Run<'_, impl Method>) -> bool {
+        run.iteration().is_multiple_of(self.every) || run.is_done()
     }
 
     /// Adds an iteration.
     ///
     /// # Errors
     /// [`RunError::Write`] when a row was due and could not be written.
-    pub fn add(&mut self, run: &impl Resumable, step: &LoggedStep) -> Result<(), RunError> {
+    pub fn add<M: Method>(&mut self, run: &Run<'_, M>, step: &LoggedStep) -> Result<(), RunError> {
         if !step.is_dropped {
             self.loss += step.loss;
             // A view that is reproduced exactly has an infinite PSNR, and so would every mean with it, which no curve shows. As
@@ -119,7 +120,7 @@ impl ProgressLog {
             0 => ",,".to_owned(),
             n => self.bits.map(|bits| format!("{:.2}", bits / n as f64)).join(","),
         };
-        let [n_anchors, n_drawn] = run.size();
+        let [n_anchors, n_drawn] = M::size(&run.state.learned);
         let (seconds, n_dropped) = (run.seconds(), run.n_dropped());
         let row = format!("{iteration},{means},{n_anchors},{seconds:.3},{n_dropped},{bits},{n_drawn}\n");
         (self.loss, self.psnr_db, self.n) = (0.0, 0.0, 0);

@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::{Resumable, RunError, RunFolder, files};
+use super::{RunError, RunFolder, files};
 use crate::train::run::checkpoint::CheckpointFault;
 use crate::train::run::{Method, RestoreError, Restored, Run};
 use crate::train::{TrainConfig, Trainer};
@@ -57,13 +57,10 @@ pub fn fork<'a>(
 }
 
 /// A run taken up again.
-pub type Resumed<'a, M> = Newest<Restored<'a, M>>;
-
-/// What the newest sound checkpoint holds.
 #[derive(Debug)]
-pub struct Newest<T> {
-    /// The state.
-    pub restored: T,
+pub struct Resumed<'a, M: Method> {
+    /// As the newest sound checkpoint has it.
+    pub restored: Restored<'a, M>,
     /// What is wrong with newer checkpoints, which were passed over.
     pub passed_over: Vec<String>,
 }
@@ -78,7 +75,7 @@ impl RunFolder {
     ///
     /// # Errors
     /// [`RunError::Write`] when there is no room or right to write; the older checkpoints stay.
-    pub fn save(&self, run: &impl Resumable) -> Result<(), RunError> {
+    pub fn save(&self, run: &Run<'_, impl Method>) -> Result<(), RunError> {
         files::write_whole(&self.path.join(file_name(run.iteration())), |out| run.save(out))?;
         let passing = self.checkpoints()?.into_iter().filter(|(iteration, _)| !self.forks_at.contains(iteration));
         passing.skip(KEPT).try_for_each(|(_, path)| files::remove(&path))
@@ -90,19 +87,11 @@ impl RunFolder {
     /// [`RunError::Restore`] when `capture` is not that of the run, [`RunError::AllDamaged`] when no checkpoint is
     /// sound.
     pub fn resume<'a, M: Method>(&self, capture: &'a Capture) -> Result<Option<Resumed<'a, M>>, RunError> {
-        self.newest(|bytes| Run::restore(capture, bytes))
-    }
-
-    /// What `restore` makes of the newest sound checkpoint; none when the run was stopped before it wrote one.
-    ///
-    /// # Errors
-    /// As [`Self::resume`].
-    fn newest<T>(&self, restore: impl Fn(&[u8]) -> Result<T, RestoreError>) -> Result<Option<Newest<T>>, RunError> {
         let mut passed_over = Vec::new();
         for (_, path) in self.checkpoints()? {
             let bytes = fs::read(&path).map_err(|source| RunError::io("read", &path, source))?;
-            match restore(&bytes) {
-                Ok(restored) => return Ok(Some(Newest { restored, passed_over })),
+            match Run::restore(capture, &bytes) {
+                Ok(restored) => return Ok(Some(Resumed { restored, passed_over })),
                 Err(RestoreError::Fault(fault)) if !matches!(fault, CheckpointFault::Version { .. }) => {
                     passed_over.push(format!("{}: {fault}", path.display()));
                 }

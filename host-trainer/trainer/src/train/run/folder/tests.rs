@@ -1,11 +1,11 @@
 use std::fs;
-use std::io::Write;
 use std::sync::atomic::AtomicBool;
 
 use super::*;
 use crate::train::run::Neural;
-use crate::train::test_capture::{tiny_capture, tiny_config};
-use pocketsplat_kernels::step::StepReport;
+use crate::train::run::residence::Residence;
+use crate::train::test_capture::{SIZE_PX, tiny_capture, tiny_config};
+use pocketsplat_kernels::step::{LoadNumber, StepReport};
 
 const ITERATIONS: u32 = 40;
 
@@ -129,75 +129,45 @@ fn a_fork_begins_where_its_run_stood() {
     assert!(source.contains(&expected), "{error}: {source}");
 }
 
-/// A run whose checkpoints fail to write.
-struct Unwritable;
-
-impl Resumable for Unwritable {
-    fn iteration(&self) -> u32 {
-        12
-    }
-
-    fn iterations(&self) -> u32 {
-        40
-    }
-
-    fn seconds(&self) -> f64 {
-        0.0
-    }
-
-    fn n_dropped(&self) -> u32 {
-        0
-    }
-
-    fn size(&self) -> [usize; 2] {
-        [0; 2]
-    }
-
-    fn largest_px(&self) -> [u32; 2] {
-        [5, 4]
-    }
-
-    fn save(&self, out: &mut dyn Write) -> std::io::Result<()> {
-        out.write_all(b"half")?;
-        Err(std::io::ErrorKind::StorageFull.into())
-    }
-}
-
 #[test]
 fn a_fork_has_a_folder_only_with_its_first_checkpoint() {
-    let home = tempfile::tempdir().unwrap();
+    let (home, capture) = (tempfile::tempdir().unwrap(), tiny_capture());
     let path = home.path().join("a.run");
+    let mut trainer = Trainer::new(&capture, tiny_config(ITERATIONS)).unwrap();
+    // What is on a device, and was not fetched, cannot be written.
+    trainer.machine.device.residence = Residence::Device(LoadNumber(1));
     // Neither where there was nothing, nor where a finished run lies.
     for finished in [false, true] {
         if finished {
             RunFolder::start(&path, "a = 1", false).unwrap().finish("{}", false).unwrap();
         }
-        let error = RunFolder::start_from(&path, "a = 2", false, &Unwritable).unwrap_err();
+        let error = RunFolder::start_from(&path, "a = 2", false, &trainer).unwrap_err();
         assert!(matches!(error, RunError::Write { .. }), "{error}");
         assert!(
             matches!(RunFolder::reopen(&path), Err(RunError::NoRun { .. })),
             "it would begin with the capture's points"
         );
     }
-    let capture = tiny_capture();
-    let trainer = Trainer::new(&capture, tiny_config(ITERATIONS)).unwrap();
+    trainer.machine.device.residence = Residence::Host;
     let folder = RunFolder::start_from(&path, "a = 2", false, &trainer).unwrap();
     assert_eq!(names(&folder), ["config.toml", "iteration-00000000.checkpoint", "lock"]);
 }
 
 #[test]
 fn a_view_that_is_reproduced_exactly_has_a_psnr_that_a_curve_shows() {
-    let home = tempfile::tempdir().unwrap();
+    let (home, capture) = (tempfile::tempdir().unwrap(), tiny_capture());
     let path = home.path().join(LOG);
-    let mut log = ProgressLog::open(&path, &Unwritable).unwrap();
+    let trainer = Trainer::new(&capture, tiny_config(ITERATIONS)).unwrap();
+    let mut log = ProgressLog::open(&path, &trainer).unwrap();
     for squared_error in [0.0, 0.01] {
-        log.add(&Unwritable, &LoggedStep { loss: 0.5, squared_error, rate: None, is_dropped: false }).unwrap();
+        log.add(&trainer, &LoggedStep { loss: 0.5, squared_error, rate: None, is_dropped: false }).unwrap();
     }
     let text = fs::read_to_string(&path).unwrap();
     let psnr = |row: &str| row.split(',').nth(2).unwrap().parse::<f64>().unwrap();
     let found: Vec<f64> = text.lines().skip(1).map(psnr).collect();
-    // One of 60 values is off by one level.
-    let expected = [10.0 * (255.0 * 255.0 * 60.0_f64).log10(), 20.0];
+    // One of a photograph's values is off by one level.
+    let n_values = f64::from(3 * SIZE_PX * SIZE_PX);
+    let expected = [10.0 * (255.0 * 255.0 * n_values).log10(), 20.0];
     assert!(found.len() == 2 && found.iter().zip(expected).all(|(found, psnr)| (found - psnr).abs() < 1e-3), "{text}");
 }
 

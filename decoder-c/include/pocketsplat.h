@@ -1,6 +1,6 @@
 /* pocketsplat: draws a compressed neural Gaussian-splat scene without an allocator, in memory that is known beforehand.
  *
- * Written by `cargo test` from src/: change that, and run `BLESS=1 cargo test`.
+ * Written by `cargo test` from src/: change that, and run `POCKETSPLAT_BLESS=1 cargo test`.
  */
 
 #ifndef POCKETSPLAT_H
@@ -224,6 +224,8 @@ enum psb_status psb_make_plan(const uint8_t *bundle,
                               struct psb_message *message);
 
 // The bundle's own camera, with which a device may begin: for frames of width_px by height_px, or of its own size for 0 by 0.
+//
+// Other proportions than its own stretch the picture.
 //
 // bundle: bundle_len bytes of a .psb, which are checked. message: NULL, or where to say what was wrong.
 //

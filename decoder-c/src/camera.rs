@@ -45,6 +45,8 @@ impl From<pocketsplat_core::Camera> for Camera {
 
 /// The bundle's own camera, with which a device may begin: for frames of width_px by height_px, or of its own size for 0 by 0.
 ///
+/// Other proportions than its own stretch the picture.
+///
 /// bundle: bundle_len bytes of a .psb, which are checked. message: NULL, or where to say what was wrong.
 ///
 /// # Safety

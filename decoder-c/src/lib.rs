@@ -36,7 +36,7 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
 mod tests {
     use std::path::Path;
 
-    /// The committed header is what the source says; with `BLESS=1` it is written.
+    /// The committed header is what the source says; with `POCKETSPLAT_BLESS=1` it is written.
     #[test]
     fn the_header_is_that_of_the_source() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -48,10 +48,10 @@ mod tests {
         let mut text = Vec::new();
         builder.generate().expect("a header").write(&mut text);
         let header = root.join("include/pocketsplat.h");
-        if std::env::var_os("BLESS").is_some() {
+        if std::env::var_os("POCKETSPLAT_BLESS").is_some() {
             std::fs::write(&header, &text).expect("written");
         }
-        let committed = std::fs::read(&header).expect("include/pocketsplat.h; write it with BLESS=1 cargo test");
-        assert!(committed == text, "include/pocketsplat.h is not what src/ says; run BLESS=1 cargo test and commit it");
+        let committed = std::fs::read(&header).expect("include/pocketsplat.h; write it with POCKETSPLAT_BLESS=1 cargo test");
+        assert!(committed == text, "include/pocketsplat.h is not what src/ says; run POCKETSPLAT_BLESS=1 cargo test and commit it");
     }
 }

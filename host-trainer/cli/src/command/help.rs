@@ -22,6 +22,8 @@ const GROUPS: [(&str, &[&str]); 5] = [
 const LOOKING: &[&str] = &["eval", "render", "verify", "cost", "export"];
 /// What the help of --effects says of a choice that `import` refuses.
 const AUTO_OF_EFFECTS: &str = "auto, which tests them in runs of 16,000 iterations and more, or a list";
+/// What the help of --backbone says of a kind that makes no bundle.
+const EXPLICIT: &str = "; 3dgs (3D Gaussian Splatting) makes an uncompressed .ply to compare with";
 /// Defaults in which commands that share an option differ.
 const DEFAULTS: [(&[&str], &str, &str); 14] = [
     (&["train"], "max_resolution", "by the preset"),
@@ -54,7 +56,9 @@ pub(super) fn own_options(mut command: Command) -> Command {
     let drawn = |arg: Arg| arg.value_parser(one_of::<Background>(DRAWN_BACKGROUNDS));
     command = command.mut_subcommand("survey", |command| with(command, "background", drawn));
     command.mut_subcommand("import", |command| {
-        let command = with(command, "backbone", |arg| arg.value_parser(backbone_of_anchors()));
+        let command = with(command, "backbone", |arg| {
+            with_help(arg.value_parser(backbone_of_anchors()), |help| help.replacen(EXPLICIT, "", 1))
+        });
         let command =
             with(command, "effects", |arg| with_help(arg, |help| help.replacen(AUTO_OF_EFFECTS, "a list", 1)));
         with(command, "background", drawn)
@@ -120,6 +124,8 @@ mod tests {
                     command.get_name(),
                     arg.get_id()
                 );
+                let has_3dgs = arg.get_id() == "backbone" && help.contains("3dgs");
+                assert!(!has_3dgs || command.get_name() == "train", "{}: {help}", command.get_name());
                 let offers = |value: &str| arg.get_possible_values().iter().any(|other| other.get_name() == value);
                 assert!(!offers("3dgs") || command.get_name() == "train", "{}", command.get_name());
                 let speaks_of_auto =
@@ -195,7 +201,12 @@ mod tests {
                     .chain(long.map(|long| format!("--{long}")))
                     .chain(arg.get_visible_aliases().into_iter().flatten().map(|alias| format!("--{alias}")))
                     .collect();
-                if takes_value { format!("{} {value}", names.join(", ")) } else { names.join(", ") }
+                let names = names.join(", ");
+                match takes_value {
+                    true if arg.is_require_equals_set() => format!("{names}[={value}]"),
+                    true => format!("{names} {value}"),
+                    false => names,
+                }
             }
         }
     }

@@ -50,6 +50,7 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
+use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 use crate::say::say;
@@ -93,6 +94,16 @@ enum Command {
     Man(completions::ManArgs),
 }
 
+/// Takes out clap's tip to pass an unknown option as a value: no command takes such values.
+fn drop_tip_of_values(error: &mut clap::Error) {
+    if let Some(ContextValue::StyledStrs(mut tips)) = error.remove(ContextKind::Suggested) {
+        tips.retain(|tip| !tip.to_string().contains(" as a value, use "));
+        if !tips.is_empty() {
+            error.insert(ContextKind::Suggested, ContextValue::StyledStrs(tips));
+        }
+    }
+}
+
 /// Parses the command line, runs the command, and says what failed: as JSON on stdout where results go there as JSON.
 ///
 /// * `arguments`: without the program's name.
@@ -104,7 +115,8 @@ pub(crate) fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let parsed = command.try_get_matches_from([OsString::from("pocketsplat")].iter().chain(&arguments));
     let cli = match parsed.and_then(|matches| Cli::from_arg_matches(&matches)) {
         Ok(cli) => cli,
-        Err(error) => {
+        Err(mut error) => {
+            drop_tip_of_values(&mut error);
             let hint = foreign::hint(&arguments, &error);
             if as_json && error.use_stderr() {
                 let said = error.render().to_string();

@@ -2,19 +2,21 @@
 
 mod spec;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use clap::{Args as _, FromArgMatches as _};
 use pocketsplat_files::{Outputs, shell_word};
+use pocketsplat_metrics::Lpips;
 
 use super::devices::DeviceChoice;
 use super::loaded::LoadedCapture;
 use super::lpips::LpipsArgs;
 use super::outputs::{BUNDLE, OverwriteArgs};
 use super::tables::published::PublishedRow;
-use super::workflow::{Place, Planner};
+use super::workflow::{PUBLISHED, Place, Planner};
 use super::{output, point, stop, tables, train, train_args};
 use crate::config::{RunConfig, absolute};
 use crate::program;
@@ -52,10 +54,8 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     for path in std::iter::once(PathBuf::from(".")).chain(program::path()) {
         absolute(&path)?;
     }
-    let lpips = args.lpips.options()?;
-    if let Some(published) = &spec.published {
-        PublishedRow::read_all(published)?;
-    }
+    let (lpips, network) = (args.lpips.options()?, args.lpips.load()?);
+    let published = spec.published.as_deref().map(PublishedRow::read_all).transpose()?;
     let outputs = args.overwrite.outputs().reading(&args.spec);
     // All of them before the first capture is loaded.
     let mut asked = Vec::new();
@@ -64,7 +64,10 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
         let (config, device) = configured(&run, output).with_context(|| format!("{} is no run", run.name))?;
         asked.push((run, config, device));
     }
-    // Seed by seed, since points drawn at random follow it: each capture is loaded once for each. Sorting keeps the order otherwise.
+    if let Some(published) = &published {
+        warn_of_unpublished(&asked.iter().map(|(run, ..)| [&*run.dataset, &*run.scene]).collect(), published);
+    }
+    // Seed by seed, since points drawn at random follow it. Sorting keeps the order otherwise.
     asked.sort_by_key(|(run, config, _)| (run.dataset.clone(), run.scene.clone(), config.train.seed));
     let (mut loaded, mut planner) = (LoadedCapture::default(), Planner::default());
     for (run, config, device) in asked {
@@ -77,11 +80,11 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     drop(loaded);
     let mut merge = vec!["tables".to_owned(), folder.display().to_string()];
     if let Some(published) = &spec.published {
-        merge.extend(["--published".to_owned(), published.display().to_string()]);
+        merge.extend([PUBLISHED.to_owned(), published.display().to_string()]);
     }
     planner.write(&folder, merge, &tables::FILES, &outputs)?;
     if args.run {
-        return run_here(args, &planner, &folder, &spec, &outputs);
+        return run_here(&planner, &folder, &spec, network.as_ref(), &outputs);
     }
     output::print_text(&format!(
         "{}\ntrain them:  cd {} && snakemake --cores all\n",
@@ -92,8 +95,13 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
 }
 
 /// Trains and measures what is not yet; after each run the tables hold what is there.
-fn run_here(args: &Args, planner: &Planner, folder: &Path, spec: &Spec, outputs: &Outputs) -> Result<ExitCode> {
-    let lpips = args.lpips.load()?;
+fn run_here(
+    planner: &Planner,
+    folder: &Path,
+    spec: &Spec,
+    lpips: Option<&Lpips>,
+    outputs: &Outputs,
+) -> Result<ExitCode> {
     // All of them before the first is trained for an hour.
     for (_, config, _) in planner.runs() {
         outputs.clone().file(&config.output, BUNDLE)?;
@@ -109,13 +117,25 @@ fn run_here(args: &Args, planner: &Planner, folder: &Path, spec: &Spec, outputs:
             say!("the same command again resumes here");
             return Ok(ExitCode::from(stop::INTERRUPTED));
         }
-        point::measured(&config, lpips.as_ref())?;
+        point::measured(&config, lpips)?;
         tables::write(folder, spec.published.as_deref(), outputs)?;
     }
     drop(loaded);
     train::clear_photographs(folder, ExitCode::SUCCESS);
     output::print_text(&tables::write(folder, spec.published.as_deref(), outputs)?)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Warns of scenes that are published under another name, or not at all.
+fn warn_of_unpublished(places: &BTreeSet<[&str; 2]>, published: &[PublishedRow]) {
+    for [dataset, scene] in places {
+        if !published.iter().any(|row| (&*row.dataset, &*row.scene) == (*dataset, *scene)) {
+            say!(
+                "warning: no published result is of {dataset} {scene}; call datasets and scenes as the table of published results does, or \
+                 leave `published` out"
+            );
+        }
+    }
 }
 
 /// The configuration that `train` makes of a run's options, and what is to train it.

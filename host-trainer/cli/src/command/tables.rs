@@ -31,13 +31,13 @@ pub(super) const OWN_NAMES: [&str; 3] = ["runs", "bd_rate", "comparison"];
 ///
 /// tables/runs.csv has every run; DATASET.csv and DATASET/SCENE.csv the columns of the 3DGS compression survey, means over seeds;
 /// bd_rate.csv how many bytes each method takes against the plan's first at equal PSNR, with 95 % intervals over seeds; the .svg files
-/// the curves. With --published they stand beside published results, and comparison.md says what was not run.
+/// the curves. With published results they stand beside those, and comparison.md says what was not run.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Folder of the plan, as `plan-runs` wrote it.
     #[arg(value_name = "DIR")]
     folder: PathBuf,
-    /// Published results to show beside, as docs/results/published.csv has them.
+    /// Published results to show beside, as docs/results/published.csv has them [default: those of the plan]
     #[arg(long, value_name = "FILE.csv")]
     published: Option<PathBuf>,
     #[command(flatten)]
@@ -45,7 +45,9 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
-    output::print_text(&write(&args.folder, args.published.as_deref(), &args.overwrite.outputs())?)
+    let of_plan = || Ok::<_, anyhow::Error>(Plan::read(&args.folder)?.merge.published());
+    let published = args.published.clone().map_or_else(of_plan, |given| Ok(Some(given)))?;
+    output::print_text(&write(&args.folder, published.as_deref(), &args.overwrite.outputs())?)
 }
 
 /// Writes the tables of what is measured in the folder of a plan, and returns how much that is.
@@ -73,7 +75,9 @@ pub(super) fn write(folder: &Path, published: Option<&Path>, outputs: &Outputs) 
         differences.extend(differences::of_group(group));
         survey::write(&folder.join("tables"), group, &published, &mut outputs)?;
     }
-    outputs.file(&bd_rates, of_rates)?.write(&output::csv_of(&program, &differences)?)?;
+    let rates =
+        if differences.is_empty() { differences::HEADER.into() } else { output::csv_of(&program, &differences)? };
+    outputs.file(&bd_rates, of_rates)?.write(&rates)?;
     if !published.is_empty() {
         let text = comparison::markdown(&groups, &published);
         let page = Content::Text(&["# Published results and ours"], "a comparison (.md)");

@@ -26,6 +26,9 @@ const OPTIONS: Content = Content::Text(&["\n", "--"], "a list of options");
 const RULES: Content =
     Content::Text(&["# Written by pocketsplat", "# What `snakemake` in this folder takes"], "a file of the workflow");
 
+/// The option by which `tables` is given published results.
+pub(super) const PUBLISHED: &str = "--published";
+
 /// Minutes that a queue gives a run above its estimate, which is off by as much: a run that is stopped goes on.
 const MINUTES_MARGIN: f64 = 2.0;
 /// And memory.
@@ -192,6 +195,14 @@ impl Planner {
         let minutes = self.runs.iter().map(|run| run.minutes as f64).sum::<f64>() / MINUTES_MARGIN;
         let threads = rayon::current_num_threads();
         format!("{} runs, about {} one after another on {threads} threads", self.runs.len(), duration(minutes))
+    }
+}
+
+impl Merge {
+    /// The published results beside which the plan puts its runs, if it names any.
+    pub(super) fn published(&self) -> Option<PathBuf> {
+        let mut words = self.arguments.iter().skip_while(|word| *word != PUBLISHED);
+        Some(self.folder.join(words.nth(1)?))
     }
 }
 

@@ -76,7 +76,16 @@ fn measured(psnr_db: f64, bundle_bytes: u32) -> String {
 #[test]
 fn a_plan_is_written_once_and_its_tables_say_what_is_there() {
     let home = folder("plan");
-    succeeds(&mut plan(&home, PLAN));
+    let published = home.join("published.csv");
+    let heads = "Dataset,Scene,Method,Submethod,PSNR,SSIM,LPIPS,Size [Bytes],#Gaussians,Source,Note";
+    let rows = "SyntheticNeRF,,HAC,low,33.24,0.967,0.037,1240000,,a paper,\nSyntheticNeRF,lego,HAC,low,35.04,0.979,0.022,1310720,,a \
+                paper,\nDeepBlending,,HAC,low,29.98,0.902,,4560000,,a paper,\n";
+    fs::write(&published, format!("{heads}\n{rows}")).unwrap();
+    let beside = format!("published = \"published.csv\"\n{PLAN}");
+    let said = succeeds(&mut plan(&home, &beside.replace("SyntheticNeRF", "nerf_synthetic")));
+    assert!(said.contains("no published result is of nerf_synthetic lego"), "{said}");
+    let said = succeeds(&mut plan(&home, &beside));
+    assert!(!said.contains("no published result"), "{said}");
     let runs = home.join("runs");
     let planned: serde_json::Value = serde_json::from_slice(&fs::read(runs.join("runs.json")).unwrap()).unwrap();
     let planned = planned["runs"].as_array().unwrap().clone();
@@ -88,7 +97,7 @@ fn a_plan_is_written_once_and_its_tables_say_what_is_there() {
     // A queue compares times: what is right already is not written again.
     let config = runs.join("lego/hac-lambda-0.001-seed-2.toml");
     let before = fs::metadata(&config).unwrap().modified().unwrap();
-    succeeds(&mut plan(&home, PLAN));
+    succeeds(&mut plan(&home, &beside));
     assert_eq!(fs::metadata(&config).unwrap().modified().unwrap(), before);
 
     let tables = || {
@@ -106,12 +115,7 @@ fn a_plan_is_written_once_and_its_tables_say_what_is_there() {
             }
         }
     }
-    let published = home.join("published.csv");
-    let heads = "Dataset,Scene,Method,Submethod,PSNR,SSIM,LPIPS,Size [Bytes],#Gaussians,Source,Note";
-    let rows = "SyntheticNeRF,,HAC,low,33.24,0.967,0.037,1240000,,a paper,\nSyntheticNeRF,lego,HAC,low,35.04,0.979,0.022,1310720,,a \
-                paper,\nDeepBlending,,HAC,low,29.98,0.902,,4560000,,a paper,\n";
-    fs::write(&published, format!("{heads}\n{rows}")).unwrap();
-    succeeds(tables().arg("--published").arg(&published));
+    succeeds(&mut tables());
     let read = |name: &str| fs::read_to_string(runs.join("tables").join(name)).unwrap();
     assert_eq!(read("runs.csv").lines().count(), 9, "the two of scaffold are not measured");
     let differences = read("bd_rate.csv");
@@ -124,7 +128,15 @@ fn a_plan_is_written_once_and_its_tables_say_what_is_there() {
     let page = read("comparison.md");
     assert!(page.contains("| HAC low | 33.24 / 0.967 / 0.037 / 1.24 | 29.98 / 0.902 / – / 4.56 |"), "{page}");
     assert!(page.contains("| **ours: hac lambda=0.004, 32×32 px** | 30.00 / 0.900 / – / 0.10 | not run |"), "{page}");
-    assert!(read("SyntheticNeRF/lego.svg").contains("HAC (published)"));
+    let has_published = |figure: &str| read(figure).contains("HAC (published)");
+    assert!(has_published("SyntheticNeRF/lego.svg") && has_published("SyntheticNeRF.svg"), "the plan names them");
+
+    // A mean over scenes that the plan does not have.
+    let mic = "SyntheticNeRF,mic,HAC,low,35.9,0.99,0.01,900000,,a paper,";
+    fs::write(&published, format!("{heads}\n{rows}{mic}\n")).unwrap();
+    succeeds(tables().arg("--published").arg(&published));
+    assert!(has_published("SyntheticNeRF/lego.svg") && !has_published("SyntheticNeRF.svg"), "of one scene of two");
+    assert!(read("comparison.md").contains("1 of 2 scenes"), "{page}");
 
     fs::write(&published, format!("{heads}\nA,,HAC,,30,,,,,,\n")).unwrap();
     assert!(fails(tables().arg("--published").arg(&published)).contains("has no Source"));

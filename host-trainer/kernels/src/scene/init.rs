@@ -1,6 +1,7 @@
 //! Where a scene starts: one anchor per occupied lattice cell, heads drawn at random.
 
 use std::collections::BTreeSet;
+use std::ops::RangeInclusive;
 
 use glam::DVec3;
 use pocketsplat_format::bundle::{MAX_LATTICE_BITS, MAX_LATTICE_MIN};
@@ -16,6 +17,10 @@ const MIN_SQUARED_SPACING: f64 = 1e-7;
 
 /// Share of a bundle's lattice that the points may span; the rest is for anchors that grow beyond them.
 const SPANNED_SHARE: f64 = 0.99;
+/// Share of it that anchors may grow into; the rest is for a lowest corner on a coarser lattice.
+const GROWN_SHARE: f64 = 0.999;
+/// The widest span of cells of a bundle's lattice.
+const LATTICE_SPAN: u32 = (1 << MAX_LATTICE_BITS) - 1;
 
 /// The smallest voxel edge at which `points` fit the lattice of a bundle, in their units; 0 without points.
 pub fn least_voxel_size(points: &[DVec3]) -> f64 {
@@ -25,10 +30,21 @@ pub fn least_voxel_size(points: &[DVec3]) -> f64 {
     let [low, high] = points
         .iter()
         .fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], point| [low.min(*point), high.max(*point)]);
-    let n_cells = f64::from((1u32 << MAX_LATTICE_BITS) - 1);
-    let of_span = (high - low).max_element() / n_cells;
+    let of_span = (high - low).max_element() / f64::from(LATTICE_SPAN);
     let of_distance = low.abs().max(high.abs()).max_element() / f64::from(MAX_LATTICE_MIN);
     of_span.max(of_distance) / SPANNED_SHARE
+}
+
+/// The cells that anchors may grow into, along each axis: around the middle of `cells`, as many as the lattice of a bundle holds.
+pub fn lattice_room(cells: &[[i32; 3]]) -> [RangeInclusive<i32>; 3] {
+    #[expect(clippy::cast_possible_truncation, reason = "far below 2³¹")]
+    let half = (0.5 * GROWN_SHARE * f64::from(LATTICE_SPAN)) as i32;
+    let limit = MAX_LATTICE_MIN.cast_signed();
+    std::array::from_fn(|axis| {
+        let along = cells.iter().map(|cell| cell[axis]);
+        let middle = along.clone().min().unwrap_or_default().midpoint(along.max().unwrap_or_default());
+        middle.saturating_sub(half).max(-limit)..=middle.saturating_add(half).min(limit)
+    })
 }
 
 /// Builds the starting scene from points (Lu et al. 2024, Scaffold-GS, section 3.1).

@@ -35,6 +35,9 @@ impl Given {
             let found = fs::metadata(path)
                 .with_context(|| format!("`{}` is not there; give a folder of photographs, or a film", shown(path)))?;
             if !found.is_dir() {
+                if found.len() == 0 && found.is_file() {
+                    bail!("`{}` is empty: 0 bytes; copy it again from where it was taken", shown(path));
+                }
                 match kind_of(path) {
                     Some(Kind::Film) => films.push(path.clone()),
                     Some(Kind::Photograph(treatment)) => photographs.push((path.clone(), treatment)),

@@ -1,7 +1,7 @@
 //! Published results and ours in one page, as papers of this field have it.
 
 use super::curves::{Group, SceneCurves};
-use super::published::PublishedRow;
+use super::published::{PublishedRow, scenes_of};
 use super::survey::means;
 use crate::plot::ResultRow;
 
@@ -70,18 +70,11 @@ fn ours_on_datasets(
     datasets: &[&str],
     published: &[PublishedRow],
 ) -> Vec<(String, Vec<String>)> {
-    let mut scenes: Vec<&str> = published
-        .iter()
-        .filter(|row| row.dataset == group.dataset && !row.scene.is_empty())
-        .map(|row| row.scene.as_str())
-        .collect();
-    scenes.sort_unstable();
-    scenes.dedup();
-    let has = |name: &str| group.scenes.iter().any(|scene| scene.name == name);
-    let n_covered = scenes.iter().filter(|name| has(name)).count();
+    let scenes = scenes_of(published, group.dataset);
+    let n_planned = group.n_of(&scenes);
     let cell = |dataset: &&str, row: &ResultRow| match *dataset == group.dataset {
         false => NOT_RUN.to_owned(),
-        true if n_covered < scenes.len() => format!("{n_covered} of {} scenes", scenes.len()),
+        true if n_planned < scenes.len() => format!("{n_planned} of {} scenes", scenes.len()),
         true => figures(row.psnr_db, row.ssim, row.lpips, Some(row.size_bytes)),
     };
     let line = |row: ResultRow| {

@@ -84,6 +84,11 @@ impl Group<'_> {
         if self.size.is_empty() { self.dataset.to_owned() } else { format!("{}-{}px", self.dataset, self.size) }
     }
 
+    /// How many of these scenes the plan has.
+    pub(super) fn n_of(&self, names: &[&str]) -> usize {
+        names.iter().filter(|name| self.scenes.iter().any(|scene| scene.name == **name)).count()
+    }
+
     /// The methods of the plan, in its order.
     pub(super) fn methods(&self) -> Vec<&str> {
         let mut all = Vec::new();

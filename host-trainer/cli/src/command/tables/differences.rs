@@ -9,6 +9,10 @@ use super::finished::rounded;
 /// The scene of a mean over all.
 const ALL: &str = "mean of all";
 
+/// What stands above the lines of bd_rate.csv, where there are none to say it.
+pub(super) const HEADER: &str = "dataset,size,scene,method,reference,seeds,reference_seeds,bd_rate_percent,low_percent,high_percent,\
+    why_not,program\n";
+
 /// One line of bd_rate.csv.
 #[derive(Serialize)]
 pub(super) struct BdRateLine<'a> {
@@ -101,11 +105,8 @@ fn mean<'a>(group: &Group<'a>, method: &'a str, lines: &[BdRateLine<'a>]) -> Opt
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_mean_is_against_one_method() {
-        let scenes = ["a", "b"].map(|name| SceneCurves { name, methods: Vec::new() });
-        let group = Group { dataset: "D", size: "", scenes: Vec::from(scenes) };
-        let line = |scene, reference, rate| BdRateLine {
+    fn line(scene: &'static str, reference: &'static str, rate: f64) -> BdRateLine<'static> {
+        BdRateLine {
             dataset: "D",
             size: "",
             scene,
@@ -117,10 +118,22 @@ mod tests {
             low_percent: None,
             high_percent: None,
             why_not: String::new(),
-        };
+        }
+    }
+
+    #[test]
+    fn a_mean_is_against_one_method() {
+        let scenes = ["a", "b"].map(|name| SceneCurves { name, methods: Vec::new() });
+        let group = Group { dataset: "D", size: "", scenes: Vec::from(scenes) };
         let of_hac = [line("a", "hac", 20.0), line("b", "hac", 50.0)];
         assert_eq!(mean(&group, "contextgs", &of_hac).unwrap().bd_rate_percent, Some(35.0));
         assert!(mean(&group, "contextgs", &[line("a", "hac", 20.0), line("b", "hac-plus", 50.0)]).is_none());
         assert!(mean(&group, "contextgs", &of_hac[..1]).is_none(), "a scene lacks it");
+    }
+
+    #[test]
+    fn the_columns_are_those_of_a_line() {
+        let table = crate::command::output::csv_of("0.1.0 r1", [line("a", "hac", 20.0)]).unwrap();
+        assert_eq!(table.split_inclusive(|byte| *byte == b'\n').next(), Some(HEADER.as_bytes()));
     }
 }

@@ -55,7 +55,10 @@ pub(super) fn runs<'a>(plan: &'a Plan, folder: &Path) -> Result<Vec<FinishedRun<
         let bytes = std::fs::read(&path).with_context(|| format!("could not read {}", path.display()))?;
         let evaluation = serde_json::from_slice(&bytes);
         let evaluation = evaluation.with_context(|| {
-            format!("{} has no figures of a run; remove it, and call snakemake again", path.display())
+            format!(
+                "{} has no figures of a run; remove it, and give `snakemake` or `plan-runs --run` again",
+                path.display()
+            )
         })?;
         all.push(FinishedRun { name: &run.name, place: &run.place, evaluation });
     }

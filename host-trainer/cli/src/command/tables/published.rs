@@ -88,6 +88,15 @@ impl PublishedRow {
     }
 }
 
+/// The scenes of a dataset that are published one by one, each once.
+pub(in crate::command) fn scenes_of<'a>(rows: &'a [PublishedRow], dataset: &str) -> Vec<&'a str> {
+    let rows = rows.iter().filter(|row| row.dataset == dataset && !row.scene.is_empty());
+    let mut scenes: Vec<&str> = rows.map(|row| row.scene.as_str()).collect();
+    scenes.sort_unstable();
+    scenes.dedup();
+    scenes
+}
+
 /// Methods whose backbones can be trained here: their curves are always shown.
 const BACKBONES: [&str; 4] = ["Scaffold-GS", "HAC", "HAC++", "ContextGS"];
 

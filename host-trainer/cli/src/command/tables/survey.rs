@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::curves::{Curve, Group, SceneCurves, mean, row};
 use super::finished::rounded;
-use super::published::{self, PublishedRow};
+use super::published::{self, PublishedRow, scenes_of};
 use crate::command::output;
 use crate::command::outputs::{FIGURE, table};
 use crate::plot::{Named, ResultRow, SizeAxis, rate_distortion_svg};
@@ -40,7 +40,8 @@ struct SurveyLine<'a> {
 
 /// Writes the tables and figures of a group: GROUP.csv, means over the scenes where every scene is measured, and GROUP/SCENE.csv.
 ///
-/// Published results in its figures are of the field's usual sizes, whatever ours are.
+/// Published results in its figures are of the field's usual sizes, whatever ours are. Their means stand beside ours where the plan has all
+/// of their scenes.
 pub(super) fn write(folder: &Path, group: &Group<'_>, published: &[PublishedRow], outputs: &mut Outputs) -> Result<()> {
     let within = folder.join(group.name());
     for scene in &group.scenes {
@@ -53,7 +54,10 @@ pub(super) fn write(folder: &Path, group: &Group<'_>, published: &[PublishedRow]
     let lines: Vec<SurveyLine<'_>> = methods.iter().flat_map(|method| of_dataset(group, method)).collect();
     let mut named: Vec<Named<Vec<ResultRow>>> =
         methods.iter().map(|method| Named { name: (*method).to_owned(), what: means(group, method) }).collect();
-    named.extend(published::curves(published, group.dataset, ""));
+    let scenes = scenes_of(published, group.dataset);
+    if group.n_of(&scenes) == scenes.len() {
+        named.extend(published::curves(published, group.dataset, ""));
+    }
     write_both(&folder.join(format!("{}.csv", group.name())), &lines, &named, outputs)
 }
 

@@ -41,6 +41,14 @@ fn phases_follow_each_other_at_their_shares_of_the_run() {
 }
 
 #[test]
+fn anchors_grow_from_a_twentieth_to_the_middle_of_a_run() {
+    let config = TrainConfig { iterations: 30_000, ..TrainConfig::default() };
+    let Densification { statistics_from, from, until, interval, levels, gradient_threshold, .. } = config.densification;
+    let at = [statistics_from, from, until].map(|share| config.iteration_at(share));
+    assert_eq!((at, interval, levels, gradient_threshold), ([500, 1_500, 15_000], 100, 3, 2e-4));
+}
+
+#[test]
 fn a_detail_head_is_the_modules() {
     let mut config = TrainConfig::default();
     config.shape.detail_hidden = 5;

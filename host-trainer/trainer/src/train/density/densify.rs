@@ -8,7 +8,7 @@ use super::Statistics;
 use crate::train::optimiser::{Optimiser, retain_rows};
 use crate::train::schedule::Densification;
 use pocketsplat_kernels::ops::rate::noise::Stream;
-use pocketsplat_kernels::scene::init::lattice_cell;
+use pocketsplat_kernels::scene::init::{lattice_cell, lattice_room};
 use pocketsplat_kernels::scene::{Anchors, INITIAL_MASK_LOGIT, Scene};
 
 /// Base log-scales above this are lowered to it at every event, as the published trainer does: l_g ≤ e^0.05.
@@ -38,6 +38,7 @@ pub fn grow(
     let n_before = scene.anchors.len();
     let eligible: Vec<usize> = (0..n_before * k).filter(|at| f64::from(statistics.n_drawn[*at]) > enough).collect();
     let mean_gradient = |at: usize| f64::from(statistics.gradient_sum[at]) / f64::from(statistics.n_drawn[at].max(1));
+    let lattice = lattice_room(&scene.anchors.lattice);
     for level in 0..settings.levels {
         let cells = coarsest_cells / EDGE_RATIO.pow(level);
         if cells == 0 || (level > 0 && scene.anchors.len() == n_before) {
@@ -51,6 +52,9 @@ pub fn grow(
             f64::from(of_cell.uniform((at % k) as u32)) > drop_below
         };
         let edge = scene.voxel_size * f64::from(cells);
+        let cells = i32::try_from(cells).expect("a voxel spans a few cells");
+        let at_lattice = |cell: [i32; 3]| cell.map(|c| c.saturating_mul(cells));
+        let is_outside = |cell| lattice.iter().zip(at_lattice(cell)).any(|(along, c)| !along.contains(&c));
         let cell_of = |p: DVec3| lattice_cell(p, edge);
         let position =
             |scene: &Scene<f32>, a: usize| DVec3::from(scene.anchors.lattice[a].map(f64::from)) * scene.voxel_size;
@@ -63,7 +67,7 @@ pub fn grow(
                     * f64::from(scene.anchors.log_scales[anchor * scene.shape.n_log_scales() + i]).exp()
             }));
             let cell = cell_of(position(scene, anchor) + offset);
-            if occupied.contains(&cell) {
+            if occupied.contains(&cell) || is_outside(cell) {
                 continue;
             }
             let parent = &scene.anchors.features[anchor * f..(anchor + 1) * f];
@@ -76,10 +80,9 @@ pub fn grow(
         }
         #[expect(clippy::cast_possible_truncation, reason = "the logarithm of an edge is small")]
         let log_edge = edge.ln() as f32;
-        let cells = i32::try_from(cells).expect("a voxel spans a few cells");
         let room = settings.max_anchors.map_or(usize::MAX, |most| most.saturating_sub(scene.anchors.len()));
         for (cell, feature) in best_supported(candidates, room) {
-            scene.anchors.lattice.push(cell.map(|c| c.saturating_mul(cells)));
+            scene.anchors.lattice.push(at_lattice(cell));
             scene.anchors.features.extend(feature);
             scene.anchors.log_scales.extend(std::iter::repeat_n(log_edge, scene.shape.n_log_scales()));
             scene.anchors.offsets.extend(std::iter::repeat_n(0.0, 3 * k));
@@ -232,6 +235,24 @@ mod tests {
         let again =
             grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), 4, streams::growth(1, 100));
         assert_eq!(again, 0, "nothing is eligible");
+    }
+
+    #[test]
+    fn an_offset_beyond_the_lattice_of_a_bundle_grows_nothing() {
+        let (mut scene, mut optimiser, mut statistics) = start(&[DVec3::ZERO, DVec3::ONE]);
+        scene.anchors.log_scales[..3].fill(0.0);
+        // A bundle spans 2²¹ cells, here 0.001 wide: from about −1,048 to 1,048.
+        let near = [1000.0, -1000.0].repeat(3);
+        for (k, x) in near.into_iter().chain([1100.0, -1100.0, f32::INFINITY, -1100.0]).enumerate() {
+            scene.anchors.offsets[k * 3] = x;
+            (statistics.n_drawn[k], statistics.gradient_sum[k]) = (41, 41.0);
+        }
+        let settings = Densification { levels: 3, ..Densification::default() };
+        grow(&mut scene, &mut optimiser, &mut statistics, &settings, 16, streams::growth(1, 100));
+        consistent(&scene, &optimiser, &statistics);
+        let mut grown: Vec<i32> = scene.anchors.lattice[2..].iter().map(|cell| cell[0]).collect();
+        grown.sort_unstable();
+        assert!(!grown.is_empty() && grown.iter().all(|x| x.abs() == 1_000_000), "{grown:?}");
     }
 
     #[test]

@@ -75,6 +75,7 @@ const fn background_rate() -> LearningRate {
 /// Share of the run after which rates fall.
 pub(super) const DECAY_FROM: f64 = 0.85;
 
+// docs/method.md has the same table, and a test in `optimiser` looks at each rate through a run.
 impl Default for Rates {
     fn default() -> Self {
         let decaying = |start, end| LearningRate { start, end, from: DECAY_FROM };

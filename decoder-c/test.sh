@@ -20,7 +20,6 @@ compare() { # WHAT FOUND BUNDLE…
   echo "$what: $(grep -c , "$found") frames as in tests/golden/frames.csv"
 }
 
-cargo fmt --check
 cargo clippy -q --all-targets --locked -- -D warnings
 cargo test -q --locked
 

@@ -127,12 +127,10 @@ program() { # NAME ARGUMENTS…
 # --- Jobs: `job_NAME` runs as NAME once NAME is in `jobs` -----------------------------------------------------------
 
 job_fmt() {
-  cargo fmt --all --check
-  (cd firmware-example && cargo fmt --check && cd cycles && cargo fmt --check)
-  (cd boards && cargo fmt --all --check)
-  (cd tests/link-gate && cargo fmt --check)
-  (cd tests/digest && cargo fmt --check)
-  (cd fuzz && cargo fmt --check)
+  local manifest
+  for manifest in $(git ls-files '*Cargo.toml' | xargs grep -l '^\[workspace\]'); do
+    cargo fmt --all --check --manifest-path "$manifest"
+  done
 }
 
 job_clippy() {

@@ -51,7 +51,11 @@ mod tests {
         if std::env::var_os("POCKETSPLAT_BLESS").is_some() {
             std::fs::write(&header, &text).expect("written");
         }
-        let committed = std::fs::read(&header).expect("include/pocketsplat.h; write it with POCKETSPLAT_BLESS=1 cargo test");
-        assert!(committed == text, "include/pocketsplat.h is not what src/ says; run POCKETSPLAT_BLESS=1 cargo test and commit it");
+        let committed =
+            std::fs::read(&header).expect("include/pocketsplat.h; write it with POCKETSPLAT_BLESS=1 cargo test");
+        assert!(
+            committed == text,
+            "include/pocketsplat.h is not what src/ says; run POCKETSPLAT_BLESS=1 cargo test and commit it"
+        );
     }
 }

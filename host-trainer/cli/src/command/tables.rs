@@ -45,8 +45,10 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
-    let of_plan = || Ok::<_, anyhow::Error>(Plan::read(&args.folder)?.merge.published());
-    let published = args.published.clone().map_or_else(of_plan, |given| Ok(Some(given)))?;
+    let published = match &args.published {
+        Some(given) => Some(given.clone()),
+        None => Plan::read(&args.folder)?.merge.published(),
+    };
     output::print_text(&write(&args.folder, published.as_deref(), &args.overwrite.outputs())?)
 }
 

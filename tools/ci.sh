@@ -114,8 +114,9 @@ need_tool() { # CRATE VERSION
 }
 
 need_python() {
-  need_command python3 python3 python3-venv
-  python3 -c 'import ensurepip' 2>/dev/null || fail "python3 makes no virtual environments: install it (Debian: apt-get install python3-venv)"
+  need_command python3 python3
+  # The name is of no command.
+  python3 -c 'import ensurepip' 2>/dev/null || need_command python3-venv python3-venv
 }
 
 # One of this repository's programs, of the tests' build: built alone it would want its libraries once more, with other features.

@@ -42,6 +42,11 @@ class Camera:
         view, intrinsics = _view_of(viewmat), numpy.asarray(K, dtype=float)
         if intrinsics.shape != (3, 3):
             raise ValueError(f"K of shape {intrinsics.shape}; needed: [3, 3]")
+        if not numpy.allclose(intrinsics[2], (0, 0, 1), atol=1e-5):
+            raise ValueError(f"the last row of K is {intrinsics[2].tolist()}; needed: 0, 0, 1; transpose it if its last column is that")
+        skew = [float(intrinsics[0, 1]), float(intrinsics[1, 0])]
+        if not numpy.allclose(skew, 0, atol=1e-3):
+            raise ValueError(f"K has a skew of {skew}; needed: 0, 0; undistort the pictures to a camera without")
         rows: Any = tuple(tuple(map(float, row)) for row in view[:, :3])
         translation: Any = tuple(map(float, view[:, 3]))
         focal = (float(intrinsics[0, 0]), float(intrinsics[1, 1]))

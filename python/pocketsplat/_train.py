@@ -135,7 +135,8 @@ class Training:
             self._said.seek(0)
             said = self._said.read().strip()
             self._said.close()
-            at = said.find("error: ")
+            # At the beginning of a line: a warning may hold the word.
+            at = 0 if said.startswith("error: ") else said.find("\nerror: ") + 1 or -1
             # Killed, it had no time to say why: the last of its progress tells how far it came.
             last = "\n".join(said.splitlines()[-_LAST_LINES:])
             self._error = said[at:] if at >= 0 else f"training {_end_of(self._process.returncode)}\n{last}".strip()
@@ -188,5 +189,6 @@ def train(capture: str | os.PathLike[str], output: str | os.PathLike[str], **opt
             # `=` keeps values that begin with a hyphen apart from options.
             command += [f"{option}={one}" for one in (values if option == "--set" else [",".join(values)])]
     bundle = Path(output).absolute()
-    run = Path(options["run"]).absolute() if options.get("run") else _run_beside(bundle)
+    given = options.get("run") or options.get("resume")
+    run = Path(given).absolute() if given else _run_beside(bundle)
     return Training(command, bundle, run)

@@ -152,6 +152,12 @@ class Bundles(unittest.TestCase):
         camera = bundle.preview
         with self.assertRaisesRegex(ValueError, "last row of viewmat is .* transpose it"):
             Camera.from_matrices(bundle.preview.viewmat.T, camera.K, 80, 60)
+        with self.assertRaisesRegex(ValueError, "last row of K is .* transpose it"):
+            Camera.from_matrices(camera.viewmat, camera.K.T, 80, 60)
+        skewed = camera.K
+        skewed[0, 1] = 2.0
+        with self.assertRaisesRegex(ValueError, r"skew of \[2.0, 0.0\]"):
+            Camera.from_matrices(camera.viewmat, skewed, 80, 60)
         for draw in (lambda: bundle.render(camera.resized(70000, 60)), lambda: bundle.gaussians(camera.resized(80, 0))):
             with self.assertRaisesRegex(pocketsplat.BundleError, r"is (70000|0); needed"):
                 draw()

@@ -167,7 +167,8 @@ impl FileKind {
     }
 }
 
-fn first_bytes(path: &Path) -> io::Result<Vec<u8>> {
+/// As many bytes as tell what a file is.
+pub(crate) fn first_bytes(path: &Path) -> io::Result<Vec<u8>> {
     let mut first = Vec::with_capacity(N_FIRST);
     File::open(path)?.take(N_FIRST as u64).read_to_end(&mut first)?;
     Ok(first)

@@ -10,19 +10,17 @@ mod inputs;
 mod place;
 mod whole;
 
-use std::fs::{self, File};
-use std::io::{self, Read as _, Write};
+use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::kind::first_bytes;
 pub use content::{Content, MARK};
 pub use error::OutputError;
 use inputs::Inputs;
 use place::{Place, is_same_file};
 pub use whole::write_whole;
-
-/// As many bytes as tell what a file is.
-const N_FIRST: u64 = 1024;
 
 /// The files that a command writes, and what they may not replace.
 #[derive(Clone, Debug, Default)]
@@ -156,12 +154,6 @@ impl Output {
         }
         Ok(place)
     }
-}
-
-fn first_bytes(path: &Path) -> io::Result<Vec<u8>> {
-    let mut first = Vec::new();
-    File::open(path)?.take(N_FIRST).read_to_end(&mut first)?;
-    Ok(first)
 }
 
 #[cfg(test)]

@@ -48,6 +48,12 @@ pub fn read(bytes: &[u8]) -> Result<(Gaussians, Notes), Unreadable> {
     if list(&json, "nodes").any(|node| moves.iter().any(|name| !node[name].is_null())) {
         warnings.push("its nodes move, turn or scale their meshes, which is left out".to_owned());
     }
+    let extension = &primitive["extensions"][EXTENSION];
+    for (name, known) in [("colorSpace", "srgb_rec709_display"), ("kernel", "ellipse")] {
+        if let Some(found) = extension[name].as_str().filter(|found| *found != known) {
+            warnings.push(format!("its `{name}` is `{found}`, and is taken for `{known}`"));
+        }
+    }
     let extras = &json["asset"]["extras"];
     let numbers = serde_json::from_value(extras[FRAME].clone()).ok();
     let frame = numbers.and_then(Frame::of_numbers).unwrap_or_default();

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::folder_names::FolderNames;
 use super::listing::{ListedView, Listing, Note, commonest, every_nth};
 use super::transforms::{Transforms, read_transforms};
-use super::{DatasetError, Layout, LoadOptions, Split, ViewFault, found_files};
+use super::{DatasetError, Layout, LoadOptions, Split, ViewFault, found_files, missing_masks, nerfstudio};
 
 /// The file that tells this layout.
 pub(super) const TRAIN_FILE: &str = "transforms_train.json";
@@ -39,6 +39,7 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
         }
     }
     notes.extend(found_files::check(&mut views, &names));
+    notes.extend(missing_masks::in_frames(&views));
     for view in &mut views {
         if let (Ok(shot), Some(needed_px)) = (&view.shot, needed_px)
             && shot.header.size_px != needed_px
@@ -56,10 +57,11 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
                     folder.join(TEST_FILE).display()
                 ),
             ),
-            None => Note::no_test_views(),
+            None => Note::no_test_views(&views),
         });
     }
-    Ok(Listing { layout: Layout::Blender, source, views, points: None, unposed: Vec::new(), notes })
+    let points = nerfstudio::points(folder, &names, &train, &mut notes)?;
+    Ok(Listing { layout: Layout::Blender, source, views, points, unposed: Vec::new(), notes })
 }
 
 fn read_optional(folder: &Path, name: &str) -> Result<Option<Transforms>, DatasetError> {

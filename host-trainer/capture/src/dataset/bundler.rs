@@ -23,14 +23,9 @@ const FILES: [(&str, &str); 4] = [
     ("bundle.rd.out", "list.rd.txt"),
 ];
 
-fn files(folder: &Path) -> Option<(PathBuf, PathBuf)> {
+pub(super) fn files(folder: &Path) -> Option<(PathBuf, PathBuf)> {
     let files = FILES.iter().map(|(model, list)| (folder.join(model), folder.join(list)));
     files.into_iter().find(|(model, list)| model.is_file() && list.is_file())
-}
-
-/// Whether the folder is of this layout.
-pub(super) fn is_layout_of(folder: &Path) -> bool {
-    files(folder).is_some()
 }
 
 /// Lists the capture in `folder`, views by name.

@@ -8,14 +8,13 @@ use glam::{DMat3, DQuat, DVec3};
 use pocketsplat_files::shown;
 use rayon::prelude::*;
 
-use super::error::first_few;
 use super::folder_names::FolderNames;
 use super::image::read_header;
 use super::listing::{ListedView, Listing, Note, Shot, every_nth, unused_images};
 use super::mask_file::MaskFile;
 use super::named_path::NamedPath;
 use super::quaternion::{long_quaternions, rotation_of};
-use super::{DatasetError, Layout, LoadOptions, ViewFault, found_files, image_folder, text_file};
+use super::{DatasetError, Layout, LoadOptions, ViewFault, found_files, image_folder, missing_masks, text_file};
 
 mod binary;
 mod choose;
@@ -79,12 +78,12 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     let used_masks = views.iter().flat_map(|view| &view.shot).flat_map(|shot| &shot.masks).map(|mask| &mask.path);
     let unposed = unused_images(&image_folder, posed.iter().chain(used_masks).map(PathBuf::as_path));
     notes.extend(found_files::check(&mut views, &names));
-    notes.extend(missing_masks(masks.as_deref(), &views));
+    notes.extend(masks.as_deref().and_then(|masks| missing_masks::in_folder(masks, &views)));
     notes
         .extend(long_quaternions(&path("images"), images.iter().map(|image| (image.name.as_str(), quaternion(image)))));
     let mut listing = Listing { layout: Layout::Colmap, source: path("images"), views, points, unposed, notes };
     if !listing.has_test_views() {
-        listing.notes.push(Note::no_test_views());
+        listing.notes.push(Note::no_test_views(&listing.views));
     }
     Ok(listing)
 }
@@ -116,24 +115,6 @@ pub fn colmap_reprojection_errors_px(points: &[u8]) -> Option<Vec<f64>> {
 /// `[fx, fy]`, pixels, of each camera in the bytes of `cameras.bin`; `None` where these are damaged or a camera's model is not read.
 pub fn colmap_focal_lengths_px(cameras: &[u8]) -> Option<Vec<[f64; 2]>> {
     binary::cameras(cameras).ok()?.into_values().map(|camera| Some(camera.lens?.focal_px)).collect()
-}
-
-/// Says how many views lack a mask although others have one.
-fn missing_masks(masks: Option<&Path>, views: &[ListedView]) -> Option<Note> {
-    let masks = masks?;
-    let sound = || views.iter().filter_map(|view| Some((&view.name, view.shot.as_ref().ok()?)));
-    let without: Vec<&String> = sound().filter(|(_, shot)| shot.masks.is_empty()).map(|(name, _)| name).collect();
-    (!without.is_empty()).then(|| {
-        let text = format!(
-            "images without a mask in `{}`: {} of {} ({}), so all their pixels count; name masks like their images, with \
-             `.png` behind the name or in place of its extension",
-            shown(masks),
-            without.len(),
-            sound().count(),
-            first_few(&without, ", ")
-        );
-        Note::warning("missing-masks", text)
-    })
 }
 
 /// The mask of the image `name`: COLMAP appends `.png` to the image's name, others replace its extension.

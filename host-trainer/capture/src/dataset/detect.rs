@@ -29,14 +29,18 @@ const READERS: [Reader; 12] = [
     Reader { layout: Layout::Nerfstudio, fits: |path| path.join(nerfstudio::FILE).is_file(), list: nerfstudio::list },
     // After nerfstudio, which leaves the model in `colmap/sparse` that its transforms were made from.
     Reader { layout: Layout::Colmap, fits: |path| colmap::has_model(path, false), list: colmap::list },
-    Reader { layout: Layout::Polycam, fits: polycam::is_layout_of, list: polycam::list },
-    Reader { layout: Layout::Record3d, fits: record3d::is_layout_of, list: record3d::list },
+    Reader { layout: Layout::Polycam, fits: |path| polycam::folders(path).is_some(), list: polycam::list },
+    Reader { layout: Layout::Record3d, fits: |path| record3d::files(path).is_some(), list: record3d::list },
     Reader { layout: Layout::Nsvf, fits: nsvf::is_layout_of, list: nsvf::list },
-    Reader { layout: Layout::OpenSfm, fits: opensfm::is_layout_of, list: opensfm::list },
-    Reader { layout: Layout::Bundler, fits: bundler::is_layout_of, list: bundler::list },
-    Reader { layout: Layout::Metashape, fits: metashape::is_layout_of, list: metashape::list },
-    Reader { layout: Layout::RealityCapture, fits: realitycapture::is_layout_of, list: realitycapture::list },
-    Reader { layout: Layout::Llff, fits: llff::is_layout_of, list: llff::list },
+    Reader { layout: Layout::OpenSfm, fits: |path| opensfm::file(path).is_some(), list: opensfm::list },
+    Reader { layout: Layout::Bundler, fits: |path| bundler::files(path).is_some(), list: bundler::list },
+    Reader { layout: Layout::Metashape, fits: |path| metashape::file(path).is_some(), list: metashape::list },
+    Reader {
+        layout: Layout::RealityCapture,
+        fits: |path| realitycapture::table(path).is_some(),
+        list: realitycapture::list,
+    },
+    Reader { layout: Layout::Llff, fits: |path| path.join(llff::POSES).is_file(), list: llff::list },
 ];
 
 /// The reader of the folder `path`; none where it is no capture.

@@ -56,12 +56,16 @@ impl Note {
         Self::new("no-points", format!("{why}, {made}"))
     }
 
-    /// No view is held out of a capture that names no split of its own.
-    pub(super) fn no_test_views() -> Self {
-        Self::warning(
-            "no-test-views",
-            "no test views, so test PSNR cannot be computed; hold out every 8th image with `--test-every 8`",
-        )
+    /// No view that can be used is held out of a capture that names no split of its own.
+    pub(super) fn no_test_views(views: &[ListedView]) -> Self {
+        let n_held_out = views.iter().filter(|view| view.split == Split::Test).count();
+        let remedy = match n_held_out {
+            0 => "hold out every 8th image with `--test-every 8`".to_owned(),
+            n => format!(
+                "views that are held out and cannot be used: {n}; repair them, or hold out others with another `--test-every`"
+            ),
+        };
+        Self::warning("no-test-views", format!("no test views, so test PSNR cannot be computed; {remedy}"))
     }
 
     /// The same of a capture of nerfstudio's with a split of its own.

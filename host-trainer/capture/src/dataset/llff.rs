@@ -11,14 +11,9 @@ use super::listing::{Listing, every_nth, is_hidden};
 use super::transforms::{Frame, Intrinsics, list_frames};
 use super::{DatasetError, Layout, LoadOptions, image_folder};
 
-const POSES: &str = "poses_bounds.npy";
+pub(super) const POSES: &str = "poses_bounds.npy";
 /// Numbers of an image: 3 × 5, and two depths.
 const N_NUMBERS: usize = 17;
-
-/// Whether the folder is of this layout.
-pub(super) fn is_layout_of(folder: &Path) -> bool {
-    folder.join(POSES).is_file()
-}
 
 /// Lists the capture in `folder`, views by name.
 ///

@@ -16,14 +16,9 @@ use super::transforms::{Frame, Intrinsics, list_frames};
 use super::{DatasetError, Layout, LoadOptions, image_folder, text_file};
 
 /// The file of cameras in the folder: the first by name that is one.
-fn file(folder: &Path) -> Option<PathBuf> {
+pub(super) fn file(folder: &Path) -> Option<PathBuf> {
     let is_one = |text: String| text.contains("<document") && text.contains("<chunk");
     files_with(folder, "xml").into_iter().find(|path| text_file::read(path).is_ok_and(is_one))
-}
-
-/// Whether the folder is of this layout.
-pub(super) fn is_layout_of(folder: &Path) -> bool {
-    file(folder).is_some()
 }
 
 /// Lists the capture in `folder`, views by name.

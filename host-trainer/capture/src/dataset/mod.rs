@@ -43,6 +43,7 @@ mod mask;
 mod mask_file;
 mod matching;
 mod metashape;
+mod missing_masks;
 mod named_path;
 mod nerfstudio;
 mod no_poses;

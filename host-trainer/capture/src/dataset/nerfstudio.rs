@@ -11,7 +11,7 @@ use super::listing::{ListedView, Listing, Note, every_nth, unused_images};
 use super::named_path::NamedPath;
 use super::points::Points;
 use super::transforms::{Frame, Transforms, read_transforms};
-use super::{DatasetError, Layout, LoadOptions, Split, found_files, image_folder, ply};
+use super::{DatasetError, Layout, LoadOptions, Split, found_files, image_folder, missing_masks, ply};
 
 /// The file that tells this layout.
 pub(super) const FILE: &str = "transforms.json";
@@ -40,6 +40,7 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     };
     let mut views: Vec<ListedView> = transforms.frames.par_iter().zip(splits).filter_map(view).collect();
     notes.extend(found_files::check(&mut views, &names));
+    notes.extend(missing_masks::in_frames(&views));
     let points = points(folder, &names, &transforms, &mut notes)?;
     let unposed = unposed(folder, &names, images.as_deref(), &transforms);
     if transforms.ply_file_path.is_none() || points.as_ref().is_some_and(|(_, points)| points.is_empty()) {
@@ -48,7 +49,10 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     let mut listing = Listing { layout: Layout::Nerfstudio, source, views, points, unposed, notes };
     if !listing.has_test_views() {
         let has_own_split = transforms.splits.iter().any(Option::is_some);
-        listing.notes.push(if has_own_split { Note::no_test_views_in_own_split() } else { Note::no_test_views() });
+        listing.notes.push(match has_own_split {
+            true => Note::no_test_views_in_own_split(),
+            false => Note::no_test_views(&listing.views),
+        });
     }
     Ok(listing)
 }
@@ -97,8 +101,8 @@ fn splits(transforms: &Transforms, options: &LoadOptions, notes: &mut Vec<Note>)
     splits
 }
 
-/// The points that the file names, where they are there.
-fn points(
+/// The points that a transforms file names, where they are there.
+pub(super) fn points(
     folder: &Path,
     names: &FolderNames,
     transforms: &Transforms,

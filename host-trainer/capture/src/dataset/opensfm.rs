@@ -59,13 +59,8 @@ struct Point {
     color: Option<Vec<f64>>,
 }
 
-fn file(folder: &Path) -> Option<PathBuf> {
+pub(super) fn file(folder: &Path) -> Option<PathBuf> {
     FILES.iter().map(|name| folder.join(name)).find(|path| path.is_file())
-}
-
-/// Whether the folder is of this layout.
-pub(super) fn is_layout_of(folder: &Path) -> bool {
-    file(folder).is_some()
 }
 
 /// Lists the capture in `folder`, views by name.

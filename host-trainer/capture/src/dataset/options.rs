@@ -68,15 +68,6 @@ pub enum PointsChoice {
     Random,
 }
 
-impl fmt::Display for PointsChoice {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Matched => "matched",
-            Self::Random => "random",
-        })
-    }
-}
-
 /// Random points that are made at most: a hundred times the published number of explicit Gaussians, a thousand times that of anchors.
 pub const MOST_RANDOM_POINTS: usize = 10_000_000;
 

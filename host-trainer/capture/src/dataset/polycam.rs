@@ -17,7 +17,7 @@ use super::{DatasetError, Layout, LoadOptions, non_finite};
 const FOLDERS: [(&str, &str); 2] = [("corrected_cameras", "corrected_images"), ("cameras", "images")];
 
 /// The folders of cameras and of images: the first that hold something, for an export may leave the corrected ones empty.
-fn folders(folder: &Path) -> Option<(PathBuf, PathBuf)> {
+pub(super) fn folders(folder: &Path) -> Option<(PathBuf, PathBuf)> {
     let keyframes = folder.join("keyframes");
     let folders = FOLDERS.iter().map(|(cameras, images)| (keyframes.join(cameras), keyframes.join(images)));
     let there: Vec<_> = folders.filter(|(cameras, images)| cameras.is_dir() && images.is_dir()).collect();
@@ -28,11 +28,6 @@ fn folders(folder: &Path) -> Option<(PathBuf, PathBuf)> {
     let full =
         |(cameras, images): &&(PathBuf, PathBuf)| !files_with(cameras, "json").is_empty() && holds_images(images);
     there.iter().find(full).or_else(|| there.first()).cloned()
-}
-
-/// Whether the folder is of this layout.
-pub(super) fn is_layout_of(folder: &Path) -> bool {
-    folders(folder).is_some()
 }
 
 /// Lists the capture in `folder`, views by their time.

@@ -22,14 +22,9 @@ const NEEDED: [&str; 8] = ["name", "x", "y", "alt", "heading", "pitch", "roll", 
 const FILM_MM: f64 = 36.0;
 
 /// The table in the folder: the first by name whose head has the columns.
-fn table(folder: &Path) -> Option<PathBuf> {
+pub(super) fn table(folder: &Path) -> Option<PathBuf> {
     let is_one = |text: String| columns(&text).is_some();
     files_with(folder, "csv").into_iter().find(|path| text_file::read(path).is_ok_and(is_one))
-}
-
-/// Whether the folder is of this layout.
-pub(super) fn is_layout_of(folder: &Path) -> bool {
-    table(folder).is_some()
 }
 
 /// The line of the head, counted from 0, and the places of its columns.

@@ -37,15 +37,10 @@ struct Metadata {
     lenses: Vec<Vec<Number>>,
 }
 
-fn files(folder: &Path) -> Option<(PathBuf, PathBuf)> {
+pub(super) fn files(folder: &Path) -> Option<(PathBuf, PathBuf)> {
     let metadata = METADATA.iter().map(|name| folder.join(name)).find(|path| path.is_file())?;
     let pictures = PICTURES.iter().map(|name| folder.join(name)).find(|path| path.is_dir())?;
     Some((metadata, pictures))
-}
-
-/// Whether the folder is of this layout.
-pub(super) fn is_layout_of(folder: &Path) -> bool {
-    files(folder).is_some()
 }
 
 /// Lists the capture in `folder`, views in the order of the film.

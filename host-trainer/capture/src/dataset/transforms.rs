@@ -111,7 +111,7 @@ pub(super) fn list_frames(
     }
     let mut listing = Listing { layout, source, views, points, unposed, notes };
     if !listing.has_test_views() {
-        listing.notes.push(Note::no_test_views());
+        listing.notes.push(Note::no_test_views(&listing.views));
     }
     listing.notes.extend(of_reader);
     listing

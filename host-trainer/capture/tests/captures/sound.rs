@@ -268,6 +268,30 @@ fn a_point_cloud_and_masks_beside_transforms_are_read() {
 }
 
 #[test]
+fn a_point_cloud_that_transforms_train_names_is_read() {
+    let mut fixture = Fixture::new(Kind::Blender, 9);
+    fixture.shared.push_str(", \"ply_file_path\": \"cloud.ply\"");
+    fixture.write(
+        "cloud.ply",
+        "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n1 0 0\n",
+    );
+    let capture = fixture.write_files().load().expect("a capture").0;
+    assert_eq!(capture.points, [DVec3::ZERO, DVec3::X].map(|p| capture.normalisation.point(p)));
+}
+
+#[test]
+fn held_out_views_that_cannot_be_used_are_counted() {
+    let fixture = Fixture::new(Kind::ColmapText, 12);
+    fixture.write_files();
+    ["images/p_00.png", "images/p_08.png"].iter().for_each(|name| fixture.write(name, "cut"));
+    let report = fixture.load().expect("a capture").1.to_string();
+    assert!(
+        report.contains("views that are held out and cannot be used: 2; repair them, or hold out others"),
+        "{report}"
+    );
+}
+
+#[test]
 fn random_points_surround_what_the_cameras_look_at() {
     let mut fixture = Fixture::new(Kind::Nerfstudio, 12);
     let target = DVec3::new(50.0, -20.0, 7.0);

@@ -231,24 +231,19 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     frame::to_normalised(&mut written, &frame::of_file(&written_notes.frame, &normalisation));
     let pictures = source.pictures_of(&written, &cameras.judged);
     let file_psnr_db = cameras.psnr_db(&pictures)?;
-    warn_of_loss(
-        args,
-        &Losses {
-            fitting_db: bundle_psnr_db.zip(unrounded_psnr_db).map(|(bundle, fitted)| bundle - fitted),
-            rounding_db: unrounded_psnr_db.zip(file_psnr_db).map_or_else(
-                || loss_at_30_db(rounding::mean_psnr_db(&pictures, &unrounded)),
-                |(fitted, file)| fitted - file,
-            ),
-            rounding: Rounding {
-                given: &gaussians,
-                written: &written,
-                sources: &file_bytes.sources,
-                cameras: &cameras.judged,
-                background: source.background,
-                compensation: source.compensation,
-            },
-        },
-    );
+    let fitting_db = bundle_psnr_db.zip(unrounded_psnr_db).map(|(bundle, fitted)| bundle - fitted);
+    let rounding_db = unrounded_psnr_db
+        .zip(file_psnr_db)
+        .map_or_else(|| loss_at_30_db(rounding::mean_psnr_db(&pictures, &unrounded)), |(fitted, file)| fitted - file);
+    let rounding = Rounding {
+        given: &gaussians,
+        written: &written,
+        sources: &file_bytes.sources,
+        cameras: &cameras.judged,
+        background: source.background,
+        compensation: source.compensation,
+    };
+    warn_of_loss(&args.output, fitting_db, rounding_db, &rounding);
     let loss_db = bundle_psnr_db.zip(file_psnr_db).map(|(bundle, file)| bundle - file);
     let psnr_to_bundle_db = to_bundle(&pictures);
     let export = Export {
@@ -285,29 +280,20 @@ fn read_again(format: Format, output: &Output, written: &Written, args: &Args) -
     read.map_err(|fault| anyhow!("{} {fault}", output.path().display()))
 }
 
-/// Where an export lost what it lost.
-struct Losses<'a> {
-    /// To the photographs, by one opacity and one shape for all views; `None` where there are none.
-    fitting_db: Option<f64>,
-    /// By the file's numbers.
-    rounding_db: f64,
-    rounding: Rounding<'a>,
-}
-
-fn warn_of_loss(args: &Args, losses: &Losses<'_>) {
-    let path = args.output.display();
-    if let Some(loss) = losses.fitting_db.filter(|loss| *loss > LARGE_LOSS_DB) {
+/// Says where an export lost much.
+///
+/// * `fitting_db`: to the photographs, by one opacity and one shape for all views; `None` where there are none. * `rounding_db`: by the
+///   file's numbers.
+fn warn_of_loss(path: &Path, fitting_db: Option<f64>, rounding_db: f64, rounding: &Rounding<'_>) {
+    let path = path.display();
+    if let Some(loss) = fitting_db.filter(|loss| *loss > LARGE_LOSS_DB) {
         say!(
             "warning: {path}: one opacity and one shape for all views lose {loss:.2} dB, before any number is rounded; more --iterations or \
              a higher --sh-degree may lose less"
         );
     }
-    if losses.rounding_db > LARGE_LOSS_DB {
-        say!(
-            "warning: {path}: the format's numbers lose {:.2} dB, {}; a .ply loses none",
-            losses.rounding_db,
-            losses.rounding.worst()
-        );
+    if rounding_db > LARGE_LOSS_DB {
+        say!("warning: {path}: the format's numbers lose {rounding_db:.2} dB, {}; a .ply loses none", rounding.worst());
     }
 }
 

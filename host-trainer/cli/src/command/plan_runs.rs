@@ -141,7 +141,7 @@ fn warn_of_unpublished(places: &BTreeSet<[&str; 2]>, published: &[PublishedRow])
 /// The configuration that `train` makes of a run's options, and what is to train it.
 fn configured(run: &AskedRun, output: PathBuf) -> Result<(RunConfig, DeviceChoice)> {
     let args = args_of_train(run.options(), &run.folder, &output)?;
-    if args.is_explicit() {
+    if args.quality.is_explicit() {
         bail!("--backbone 3dgs makes no bundle; train it with `pocketsplat train` alone");
     }
     let mut config = args.resolved()?;
@@ -151,7 +151,7 @@ fn configured(run: &AskedRun, output: PathBuf) -> Result<(RunConfig, DeviceChoic
     if config.effects.auto {
         bail!("runs that are compared need the same effects; force them, as effects = \"+view-colour\"");
     }
-    Ok((config, args.device_choice()))
+    Ok((config, args.trainer.trains_on))
 }
 
 /// The command line of `train` with these options.

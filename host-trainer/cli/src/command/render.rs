@@ -29,8 +29,8 @@ use cameras::Shot;
 use pictures::{Format, Target};
 
 /// Options that speak of a capture, which pictures of a bundle alone do without.
-const OF_A_CAPTURE: [&str; 8] =
-    ["dataset", "split", "max_resolution", "background", "scene", "images", "model", "test_every"];
+const OF_A_CAPTURE: [&str; 9] =
+    ["dataset", "split", "max_resolution", "background", "scene", "images", "model", "test_every", "points"];
 
 /// Draw a bundle as pictures.
 ///

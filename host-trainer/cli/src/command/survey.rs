@@ -86,8 +86,9 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     let table = Table::begun(csv.path(), &published)?;
     let mut survey = Survey { csv, figure, table };
     let (stop, what) = (stop::flag()?, Measurements { lpips: lpips.as_ref(), ..Measurements::default() });
-    let is_done = explicit::points(&config, &folder, &what, &stop, |point| survey.add(point))?
-        && anchors::points(&config, &folder, lpips.as_ref(), |point| survey.add(point))?;
+    let is_done =
+        explicit::points(&config, &folder, &what, (args.overwrite.outputs(), &stop), |point| survey.add(point))?
+            && anchors::points(&config, &folder, lpips.as_ref(), |point| survey.add(point))?;
     if !is_done {
         say!("the same command again goes on here");
         return Ok(ExitCode::from(stop::INTERRUPTED));

@@ -37,16 +37,16 @@ pub(crate) use run_status::RunStatus;
 use summary::Summary;
 
 pub(crate) fn run(mut args: Args) -> Result<ExitCode> {
-    if args.finds_poses() {
+    if args.poses {
         let Some(capture) = poses_of(&args)? else { return Ok(ExitCode::from(stop::INTERRUPTED)) };
-        args.train_on(capture);
+        args.dataset = Some(capture);
     }
     let args = &args;
-    match args.resume() {
+    match args.resume.as_deref() {
         Some(path) => resume(args, path),
-        None if args.is_dry_run() => dry_run(args),
-        None if args.is_explicit() => explicit::begin(args),
-        None if args.continues() => begin_or_go_on(args),
+        None if args.dry_run => dry_run(args),
+        None if args.quality.is_explicit() => explicit::begin(args),
+        None if args.continues => begin_or_go_on(args),
         None => begin(args),
     }
 }
@@ -57,8 +57,8 @@ fn poses_of(args: &Args) -> Result<Option<PathBuf>> {
     let (photographs, output) = args.named_paths(none, none);
     // What would refuse the run must not do so after hours.
     let run = args.run_folder(output)?;
-    RunFolder::check(&run, args.overwrite())?;
-    if !args.is_explicit() {
+    RunFolder::check(&run, args.overwrite.is_given())?;
+    if !args.quality.is_explicit() {
         let config = args.resolved()?;
         args.output(&source_of(&config), &config.output, BUNDLE, &run)?;
     }
@@ -99,7 +99,8 @@ fn begin(args: &Args) -> Result<ExitCode> {
     let mut config = args.resolved()?;
     let path = args.run_folder(args.named_paths(&config.dataset, &config.output).1)?;
     let output = args.output(&source_of(&config), &config.output, BUNDLE, &path)?;
-    RunFolder::check(&path, args.overwrite())?;
+    RunFolder::check(&path, args.overwrite.is_given())?;
+    args.refuse_other_capture(&path, &config.dataset)?;
     // Before the run's files are touched, all that may fail: it must not cost an earlier run its results.
     let capture = load(&mut config, Some(&path), args.fork().map(|(run, _)| run))?;
     let start = match args.fork() {
@@ -117,7 +118,7 @@ fn begin(args: &Args) -> Result<ExitCode> {
         None => Start::New(Before::default()),
     };
     let machine = Machine::open(args)?;
-    let (overwrite, toml) = (args.overwrite(), config.to_toml()?);
+    let (overwrite, toml) = (args.overwrite.is_given(), config.to_toml()?);
     let folder = match &start {
         Start::Forked(trainer) => RunFolder::start_from(&path, &toml, overwrite, &**trainer)?,
         _ => RunFolder::start(&path, &toml, overwrite)?,
@@ -130,13 +131,13 @@ fn begin(args: &Args) -> Result<ExitCode> {
 
 /// Says what a run would do; of files nothing is touched.
 fn dry_run(args: &Args) -> Result<ExitCode> {
-    if args.is_explicit() {
+    if args.quality.is_explicit() {
         bail!("--dry-run is for scenes of anchors; leave out --backbone 3dgs");
     }
     let mut config = args.resolved()?;
     let capture = load(&mut config, None, None)?;
     let (with_pilots, stop) = (effects::are_measured(&config, &capture), stop::flag()?);
-    Estimate::try_out(&capture, &config.train, with_pilots, args.device()?, &stop)?;
+    Estimate::try_out(&capture, &config.train, with_pilots, args.trainer.trains_on.open()?, &stop)?;
     // What is not measured is decided.
     config.effects.auto &= with_pilots;
     output::print_text(&config.to_toml()?)?;
@@ -180,7 +181,7 @@ struct Machine {
 
 impl Machine {
     fn open(args: &Args) -> Result<Self> {
-        Ok(Self { device: args.device()?, port: args.watch().map(watch::Port::open).transpose()? })
+        Ok(Self { device: args.trainer.trains_on.open()?, port: args.watch.map(watch::Port::open).transpose()? })
     }
 }
 
@@ -244,7 +245,7 @@ fn train_watched<'a>(
         other => other,
     };
     let path = folder.path().to_owned();
-    let attempt = Attempt { device, stop: &stop, goes_on: GoesOn::Resume(args.device_choice()) };
+    let attempt = Attempt { device, stop: &stop, goes_on: GoesOn::Resume(args.trainer.trains_on) };
     if effects::resolve(&mut config, capture, &folder, &attempt)? == Resolved::Interrupted {
         return Ok(Ended::Interrupted);
     }
@@ -253,12 +254,12 @@ fn train_watched<'a>(
     };
     let (dataset, bundle) = args.named_paths(&config.dataset, &config.output);
     // A result that nobody gets costs the run no report.
-    let printed = output::print_or(&result, args.json(), Summary::of(&result, bundle));
+    let printed = output::print_or(&result, args.json, Summary::of(&result, bundle));
     // What went through a device or a FIFO cannot be read again.
     if !output.is_file() {
         return printed.map(|()| Ended::Finished { report: None });
     }
-    let report = if args.writes_report() { report::write_into(&path, &config, capture) } else { None };
+    let report = if !args.no_report { report::write_into(&path, &config, capture) } else { None };
     let split = if capture.test.is_empty() { " --split train" } else { "" };
     let (bundle, dataset) = (shell_word(bundle), shell_word(dataset));
     say!("see it:       pocketsplat render {bundle} {dataset} --view 0{split} -o view.png");

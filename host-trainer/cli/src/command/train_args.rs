@@ -6,10 +6,10 @@ use anyhow::{Result, bail};
 use pocketsplat_capture::dataset::Background;
 use pocketsplat_codec::bundle::PRUNING_RATES;
 use pocketsplat_files::{Content, Output};
-use pocketsplat_kernels::step::SharedDevice;
 use pocketsplat_trainer::device::Limits;
 use pocketsplat_trainer::effects::Price;
 use pocketsplat_trainer::train::config::Backbone;
+use pocketsplat_trainer::train::modules::pruning::Form;
 use pocketsplat_trainer::train::run::{RunFolder, is_file_of_run};
 
 use super::capture::CaptureArgs;
@@ -29,10 +29,10 @@ use crate::say::say;
 pub(crate) struct Args {
     /// Folder of the capture.
     #[arg(required_unless_present_any = ["config", "resume", "from"])]
-    dataset: Option<PathBuf>,
+    pub(super) dataset: Option<PathBuf>,
     /// First find the poses of photographs or a film, as `pocketsplat poses` does; the capture is left in OUT.capture.
     #[arg(long, conflicts_with_all = ["config", "resume", "from", "dry_run"], help_heading = INPUT, hide_short_help = true)]
-    poses: bool,
+    pub(super) poses: bool,
     #[command(flatten)]
     capture: CaptureOptions,
     /// Bundle to write; with --backbone 3dgs a .ply
@@ -43,20 +43,20 @@ pub(crate) struct Args {
     run: Option<PathBuf>,
     /// Print the result as JSON [default: as text]
     #[arg(long, help_heading = OUTPUT, hide_short_help = true)]
-    json: bool,
+    pub(super) json: bool,
     /// Write no report.html.
     #[arg(long, help_heading = OUTPUT, hide_short_help = true)]
-    no_report: bool,
+    pub(super) no_report: bool,
     /// Serve a page about the run while it goes on, to this machine alone, at a free port or the one given.
     #[arg(long, value_name = "PORT", num_args = 0..=1, require_equals = true, default_missing_value = "0", help_heading = OUTPUT, hide_short_help = true)]
-    watch: Option<u16>,
+    pub(super) watch: Option<u16>,
     /// Length of the run and size of the images: quick (2,000 iterations, 200 px), standard (7,000, 400 px), or full (30,000,
     /// images as they are) [default: standard]
     #[arg(long, value_name = "NAME", conflicts_with_all = ["config", "resume", "from"], hide_possible_values = true,
         help_heading = QUALITY)]
     preset: Option<Preset>,
     #[command(flatten)]
-    quality: QualityOptions,
+    pub(super) quality: QualityOptions,
     /// Rate weight: a larger one makes smaller files [default: 0.002 times the share of opaque pixels; by the limits for a device]
     #[arg(long, value_name = "X", help_heading = QUALITY)]
     lambda: Option<f64>,
@@ -71,14 +71,14 @@ pub(crate) struct Args {
     config: Option<PathBuf>,
     /// Print the configuration that the run would have, with every key, and the estimate; train nothing and write nothing.
     #[arg(long, conflicts_with_all = ["resume", "from", "continues", "json"], help_heading = RUN, hide_short_help = true)]
-    dry_run: bool,
+    pub(super) dry_run: bool,
     /// Run folder of an interrupted run to go on with; give DATASET as well if the capture has moved.
     #[arg(long, value_name = "OUT.run", help_heading = RUN)]
-    resume: Option<PathBuf>,
+    pub(super) resume: Option<PathBuf>,
     /// Resume or finish the run that --config names, or do nothing if it is complete.
     #[arg(long = "continue", requires = "config", conflicts_with_all = ["resume", "from", "overwrite"], help_heading = RUN,
         hide_short_help = true)]
-    continues: bool,
+    pub(super) continues: bool,
     /// Run folder of a run to branch off after iteration --at; the other options hold from there on, the size of the images too.
     #[arg(long, value_name = "OUT.run", requires = "at", conflicts_with_all = ["config", "resume"], help_heading = RUN,
         hide_short_help = true)]
@@ -87,9 +87,9 @@ pub(crate) struct Args {
     #[arg(long, value_name = "STEP", requires = "from", help_heading = RUN, hide_short_help = true)]
     at: Option<u32>,
     #[command(flatten)]
-    trainer: DeviceOption,
+    pub(super) trainer: DeviceOption,
     #[command(flatten)]
-    overwrite: OverwriteArgs,
+    pub(super) overwrite: OverwriteArgs,
     #[command(flatten)]
     options: RunOptions,
 }
@@ -108,44 +108,14 @@ pub(super) fn check_lambda(given: Option<f64>, backbone: Backbone) -> Result<()>
 }
 
 impl Args {
-    /// The run folder to go on in, if any.
-    pub(crate) fn resume(&self) -> Option<&Path> {
-        self.resume.as_deref()
-    }
-
     /// The run folder to begin from and the iteration, if any.
     pub(crate) fn fork(&self) -> Option<(&Path, u32)> {
         self.from.as_deref().zip(self.at)
     }
 
-    /// Whether a run goes on from wherever it stands.
-    pub(crate) fn continues(&self) -> bool {
-        self.continues
-    }
-
     /// Capture and output of a run as the command line names them, else as its configuration does.
     pub(crate) fn named_paths<'a>(&'a self, dataset: &'a Path, output: &'a Path) -> (&'a Path, &'a Path) {
         (self.dataset.as_deref().unwrap_or(dataset), self.output.as_deref().unwrap_or(output))
-    }
-
-    /// Whether poses are found before.
-    pub(crate) fn finds_poses(&self) -> bool {
-        self.poses
-    }
-
-    /// The same with another capture.
-    pub(crate) fn train_on(&mut self, capture: PathBuf) {
-        self.dataset = Some(capture);
-    }
-
-    /// Whether nothing is to be trained.
-    pub(crate) fn is_dry_run(&self) -> bool {
-        self.dry_run
-    }
-
-    /// Whether an unfinished run may be replaced.
-    pub(crate) fn overwrite(&self) -> bool {
-        self.overwrite.is_given()
     }
 
     /// Checks where a run writes in the end, and what its name says.
@@ -160,31 +130,6 @@ impl Args {
         let files = self.config.iter().fold(self.overwrite.outputs(), |outputs, path| outputs.reading(path));
         let outputs = self.from.iter().fold(files, |outputs, run| outputs.reading_folder(run));
         Ok(reading_capture(outputs, capture, output).file(output, content)?)
-    }
-
-    /// Whether the result is printed as JSON.
-    pub(crate) fn json(&self) -> bool {
-        self.json
-    }
-
-    /// What trains, as it was asked for.
-    pub(crate) fn device_choice(&self) -> DeviceChoice {
-        self.trainer.trains_on
-    }
-
-    /// The GPU that trains, where one is asked for or found; says on stderr which.
-    pub(crate) fn device(&self) -> Result<Option<SharedDevice<f32>>> {
-        self.trainer.trains_on.open()
-    }
-
-    /// The port of the page about the run while it goes on, if there is to be one; 0 for any.
-    pub(crate) fn watch(&self) -> Option<u16> {
-        self.watch
-    }
-
-    /// Whether the run ends with a page about it.
-    pub(crate) fn writes_report(&self) -> bool {
-        !self.no_report
     }
 
     /// The configuration of a new run: defaults, then `--config`, then what else the command line says.
@@ -227,6 +172,16 @@ impl Args {
             say!(
                 "warning: contextgs is trained for the default --tiers; with these its anchors follow other anchors in the bundle \
                  than in training"
+            );
+        }
+        let deepest = config.encoding.tiers.iter().copied().reduce(f32::max).unwrap_or_default();
+        if let Some(pruning) = config.train.modules.pruning.filter(|pruning| pruning.form == Form::Tiered)
+            && f64::from(deepest) > pruning.rate + 1e-6
+        {
+            say!(
+                "warning: tiered-pruning leaves out {} of the anchors at most while it trains, and the deepest of --tiers {deepest}; \
+                 --set train.modules.pruning.rate={deepest} trains for that",
+                pruning.rate
             );
         }
         // Absolute, so that the run can go on from any folder.
@@ -277,11 +232,6 @@ impl Args {
         self.quality.apply_to(&mut config)?;
         self.options.apply_to(&mut config);
         Ok(config)
-    }
-
-    /// Whether explicit Gaussians are asked for.
-    pub(crate) fn is_explicit(&self) -> bool {
-        self.quality.is_explicit()
     }
 
     /// The configuration of a new run on explicit Gaussians.
@@ -337,8 +287,29 @@ impl Args {
     ///
     /// * `output`: what it writes in the end.
     pub(crate) fn run_folder(&self, output: &Path) -> Result<PathBuf> {
-        run_folder(self.run.as_deref(), output, self.overwrite())
+        run_folder(self.run.as_deref(), output, self.overwrite.is_given())
     }
+
+    /// Refuses to replace what a run of another capture came to, unless that is asked for.
+    ///
+    /// * `run`: the folder that the new one works in. * `dataset`: what it is of.
+    pub(crate) fn refuse_other_capture(&self, run: &Path, dataset: &Path) -> Result<()> {
+        let other = path_of_run(run, "dataset").filter(|other| !is_same_folder(other, dataset));
+        if let Some(other) = other.filter(|_| !self.overwrite.is_given()) {
+            bail!(
+                "{} has a run of another capture, {}; choose another --output, or replace that run with --overwrite",
+                run.display(),
+                other.display()
+            );
+        }
+        Ok(())
+    }
+}
+
+/// What a key of the configuration of the run in a folder says, of anchors or not.
+fn path_of_run(folder: &Path, key: &str) -> Option<PathBuf> {
+    let text = std::fs::read_to_string(folder.join("config.toml")).ok()?;
+    Some(text.parse::<toml::Table>().ok()?.get(key)?.as_str()?.into())
 }
 
 /// Where a run works that writes `output` in the end: the folder `given`, else beside it.
@@ -349,7 +320,9 @@ pub(super) fn run_folder(given: Option<&Path>, output: &Path, overwrite: bool) -
     if std::path::absolute(&folder).ok() == std::path::absolute(output).ok() {
         bail!("{} cannot be both output and run folder; choose another folder with --run", folder.display());
     }
-    if let Some(other) = output_of(&folder).filter(|other| !overwrite && other.file_name() != output.file_name()) {
+    if let Some(other) =
+        path_of_run(&folder, "output").filter(|other| !overwrite && other.file_name() != output.file_name())
+    {
         bail!(
             "{} is the folder of the run that wrote {}; choose another folder with --run, or replace that run with --overwrite",
             folder.display(),
@@ -357,10 +330,4 @@ pub(super) fn run_folder(given: Option<&Path>, output: &Path, overwrite: bool) -
         );
     }
     Ok(folder)
-}
-
-/// What the run in a folder writes, of anchors or not.
-fn output_of(folder: &Path) -> Option<PathBuf> {
-    let text = std::fs::read_to_string(folder.join("config.toml")).ok()?;
-    Some(text.parse::<toml::Table>().ok()?.get("output")?.as_str()?.into())
 }

@@ -5,7 +5,7 @@ use plotters::coord::ranged1d::{AsRangedCoord, Ranged, ValueFormatter};
 use plotters::prelude::*;
 
 use super::chart::{self, Area, Labels, Sign};
-use super::marker;
+use super::{marker, unique};
 
 /// Costs that differ more than this many times get a logarithmic axis.
 const WIDE: f64 = 5.0;
@@ -43,12 +43,7 @@ pub(crate) struct CostPanel {
 /// PSNR over cost, a panel for each kind of it, a marker for each parameter, and a line along the Pareto front with the names of its
 /// points, as an SVG.
 pub(crate) fn cost_svg(panels: &[CostPanel]) -> Result<String> {
-    let mut parameters: Vec<&str> = Vec::new();
-    for point in panels.iter().flat_map(|panel| &panel.points) {
-        if !parameters.contains(&point.parameter.as_str()) {
-            parameters.push(&point.parameter);
-        }
-    }
+    let parameters = unique(panels.iter().flat_map(|panel| &panel.points).map(|point| point.parameter.as_str()));
     chart::figure(panels.len(), |areas, figure| {
         areas.iter().zip(panels).try_for_each(|(area, panel)| {
             let (least, most) = extremes(panel.points.iter().map(|point| point.cost));

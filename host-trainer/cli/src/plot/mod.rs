@@ -35,6 +35,17 @@ pub(crate) struct Named<T> {
     pub what: T,
 }
 
+/// Each item once, in the order of first mention.
+pub(crate) fn unique<T: PartialEq>(items: impl IntoIterator<Item = T>) -> Vec<T> {
+    let mut all = Vec::new();
+    for item in items {
+        if !all.contains(&item) {
+            all.push(item);
+        }
+    }
+    all
+}
+
 /// Items by name, names in the order of their first mention.
 pub(crate) fn gathered<T>(items: impl IntoIterator<Item = (String, T)>) -> Vec<Named<Vec<T>>> {
     let mut all: Vec<Named<Vec<T>>> = Vec::new();

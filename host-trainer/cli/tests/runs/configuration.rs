@@ -248,3 +248,24 @@ fn an_empty_configuration_trains_what_no_configuration_trains() {
     assert_eq!(dry(&["--config", empty.to_str().unwrap()]), quick);
     assert!(quick.starts_with("unset = [\"train.modules.rdo\"]\npreset = \"quick\"\n"), "{quick}");
 }
+
+#[test]
+fn tiers_deeper_than_those_trained_for_are_named_with_a_remedy_that_works() {
+    let home = folder("deeper-tiers");
+    let warned = |options: &[&str]| {
+        let mut command = pocketsplat();
+        command.arg("train").arg(capture()).arg("-o").arg(home.join("a.psb")).arg("--dry-run").args(options);
+        let said = command.output().unwrap();
+        assert!(said.status.success(), "{}", text(&said.stderr));
+        let said = text(&said.stderr);
+        said.lines().find(|line| line.starts_with("warning: tiered-pruning")).map(str::to_owned)
+    };
+    let modules = ["--modules", "rdo-pruning,tiered-pruning"];
+    assert_eq!(warned(&modules), None, "the default tiers are those that are trained for");
+    let deeper = [&modules[..], &["--tiers", "0.6,0.3,0"]].concat();
+    let said = warned(&deeper).expect("a warning");
+    let remedy = "--set train.modules.pruning.rate=0.6";
+    assert!(said.contains("leaves out 0.4 of the anchors at most") && said.contains(remedy), "{said}");
+    assert_eq!(warned(&[&deeper[..], &remedy.split(' ').collect::<Vec<_>>()].concat()), None);
+    assert_eq!(warned(&["--tiers", "0.6,0.3,0"]), None, "nothing is trained for tiers");
+}

@@ -441,6 +441,43 @@ fn two_files_of_one_stem_are_two_runs() {
 }
 
 #[test]
+fn a_run_of_another_capture_is_not_replaced_unasked() {
+    let home = folder("mistaken-another-capture");
+    let (run, bundle) = copied_run(&home);
+    let kept = |name: &str| fs::read(run.join(name)).unwrap();
+    let before = [kept("result.json"), kept("config.toml")];
+    let other = another_capture(&home);
+    let again = |options: &[&str]| {
+        let mut command = pocketsplat();
+        command
+            .arg("train")
+            .arg(&other)
+            .arg("-o")
+            .arg(&bundle)
+            .args(["--iterations", "8", "--no-report"])
+            .args(options);
+        command
+    };
+    let said = fails(&mut again(&[]));
+    let needed = format!("has a run of another capture, {}; choose another --output", capture().display());
+    assert!(said.contains(&needed), "{said}");
+    assert_eq!([kept("result.json"), kept("config.toml")], before, "nothing is lost");
+    succeeds(&mut again(&["--overwrite"]));
+}
+
+#[test]
+fn a_finished_run_without_its_bundle_is_trained_anew_with_a_word() {
+    let home = folder("mistaken-bundle-gone");
+    let (run, bundle) = copied_run(&home);
+    fs::remove_file(&bundle).unwrap();
+    let mut again = pocketsplat();
+    let output = again.arg("train").arg("--continue").arg("--config").arg(run.join("config.toml")).output().unwrap();
+    let said = text(&output.stderr);
+    assert!(output.status.success() && said.contains("is not there: it is trained anew"), "{said}");
+    assert!(bundle.is_file());
+}
+
+#[test]
 fn what_is_asked_for_in_vain_is_told_before_a_run() {
     let home = folder("mistaken-before");
     let said = fails(pocketsplat().args(["train", "--watch", "/gone", "-o"]).arg(home.join("a.psb")));

@@ -1,4 +1,5 @@
 use std::fs::Permissions;
+use std::io;
 
 use tempfile::TempDir;
 

@@ -91,6 +91,12 @@ fn what_is_missing_is_named() {
     many["accessors"][1]["count"] = u64::MAX.into();
     assert!(said(&many, &binary).contains("ends outside of the file"));
     assert!(read(b"glTF\x02\0\0\0").expect_err("cut").to_string().starts_with("is cut off"));
+    let mut linear = json.clone();
+    linear["meshes"][0]["primitives"][0]["extensions"]["KHR_gaussian_splatting"] =
+        json!({"colorSpace": "lin_rec709_display", "kernel": "ellipse"});
+    let warnings = read(&glb(&linear, &binary)).expect("whole").1.warnings;
+    assert!(warnings.iter().any(|said| said.contains("`colorSpace` is `lin_rec709_display`")), "{warnings:?}");
+    assert!(!warnings.iter().any(|said| said.contains("kernel")), "{warnings:?}");
     let mut moved = json;
     moved["nodes"][0]["translation"] = json!([1, 2, 3]);
     assert!(read(&glb(&moved, &binary)).expect("whole").1.warnings[1].contains("move, turn or scale"));

@@ -122,6 +122,11 @@ pub(super) fn cases() -> Vec<Case> {
             f.write_files().write_image("images/p_03.png", (48, 32));
         })
         .says(&["images of another size than the 24×16 px of most: 1 (p_03.png)"]),
+        case("a mask for some frames", Nerfstudio, Doubt, "missing-masks", |f| {
+            f.photos[3].extra = "\"mask_path\": \"masks/p_03.png\", ".to_owned();
+            f.write_files().write_mask("masks/p_03.png", SIZE_PX);
+        })
+        .says(&["images without a mask: 11 of 12 (", "name the mask of each in its frame as `mask_path`"]),
         case("a mask for some images", ColmapBinary, Doubt, "missing-masks", |f| {
             f.write_files().write_image("masks/p_03.png.png", SIZE_PX);
             f.write_image("masks/p_04.jpg", SIZE_PX);

@@ -113,7 +113,7 @@ fn paths() -> Vec<Case> {
             f.write_image("images/mask_02.png", SIZE_PX);
             f.write_files();
         })
-        .says(&["warnings: 1,"]),
+        .says(&["warnings: 2,"]),
     ]
 }
 

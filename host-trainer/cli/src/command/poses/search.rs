@@ -96,6 +96,13 @@ impl Search<'_> {
                     format!("comparing each of {n} photographs with the next ones, and some with each other"),
             }
         );
+        let n_spaced = self.place.state.photographs.iter().filter(|taken| has_space(&taken.name)).count();
+        if how == Matching::Sequential && n_spaced > 0 {
+            say!(
+                "warning: photographs with a space in their name: {n_spaced}; these are compared with the next ones alone, so a round trip \
+                 may not close; rename them, or give --matching exhaustive"
+            );
+        }
         let is_done = match how {
             Matching::Exhaustive => self.matched_each()?,
             Matching::Sequential => {
@@ -243,10 +250,15 @@ fn is_film(photographs: &[Taken]) -> bool {
 /// Pairs of photographs that are spread over an order, as COLMAP reads them: two names and a space between, which a name cannot hold.
 fn key_pairs(photographs: &[Taken]) -> Vec<String> {
     let every = KEY_EVERY.max(photographs.len().div_ceil(MOST_KEYS));
-    let keys = photographs.iter().map(|taken| taken.name.as_str()).filter(|name| !name.contains(char::is_whitespace));
+    let keys = photographs.iter().map(|taken| taken.name.as_str()).filter(|name| !has_space(name));
     let keys: Vec<&str> = keys.step_by(every).collect();
     let pairs = keys.iter().enumerate().flat_map(|(i, a)| keys[i + 1..].iter().map(move |b| format!("{a} {b}")));
     pairs.collect()
+}
+
+/// Whether COLMAP's lists of pairs cannot hold a name.
+fn has_space(name: &str) -> bool {
+    name.contains(char::is_whitespace)
 }
 
 /// `#1 - OPENCV`, a camera's number.

@@ -1,12 +1,9 @@
 //! Backbones as options.
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use serde::Deserialize as _;
-use serde::de::IntoDeserializer as _;
-use serde::de::value::StrDeserializer;
 
 use crate::config::EXPLICIT;
-use crate::config::named::BACKBONES;
+use crate::config::named::{BACKBONES, named};
 use pocketsplat_trainer::train::config::Backbone;
 
 /// What `--backbone` names.
@@ -28,14 +25,10 @@ pub(in crate::command) fn backbone_of_anchors() -> impl TypedValueParser<Value =
 }
 
 fn backbone_among(names: &'static [&'static str]) -> impl TypedValueParser<Value = BackboneChoice> {
-    let named = |name: String| -> Result<BackboneChoice, serde::de::value::Error> {
-        if name == EXPLICIT {
-            return Ok(BackboneChoice::Explicit);
-        }
-        let name: StrDeserializer<'_, serde::de::value::Error> = name.as_str().into_deserializer();
-        Backbone::deserialize(name).map(BackboneChoice::Anchors)
+    let choice = |name: String| -> Result<BackboneChoice, serde::de::value::Error> {
+        if name == EXPLICIT { Ok(BackboneChoice::Explicit) } else { named(&name).map(BackboneChoice::Anchors) }
     };
-    PossibleValuesParser::new(names).try_map(named)
+    PossibleValuesParser::new(names).try_map(choice)
 }
 
 #[cfg(test)]

@@ -29,7 +29,7 @@ pub(super) fn configured(of: &Anchors, folder: &Path, like: &ExplicitRunConfig) 
     let mut config = args.resolved()?;
     config.capture = like.capture.clone();
     config.check()?;
-    Ok((config, args.device_choice()))
+    Ok((config, args.trainer.trains_on))
 }
 
 /// Trains and measures what is not yet; false when it was stopped before the end.

@@ -7,6 +7,7 @@ use std::time::Instant;
 use anyhow::Result;
 use pocketsplat_baselines::TrainedScene;
 use pocketsplat_capture::dataset::{Capture, Split};
+use pocketsplat_files::Outputs;
 use pocketsplat_format::bundle::crc32;
 use pocketsplat_gaussians::{Format, Gaussians, Notes};
 use pocketsplat_trainer::explicit::frame;
@@ -49,12 +50,12 @@ struct Start<'a> {
 
 /// Trains the scene and gives it to every compressor, what is not done yet; false when it was stopped before the end.
 ///
-/// * `done`: told of each point that is there.
+/// * `outputs`: what may be replaced. * `done`: told of each point that is there.
 pub(super) fn points(
     config: &ExplicitRunConfig,
     folder: &Path,
     what: &Measurements<'_>,
-    stop: &AtomicBool,
+    (outputs, stop): (Outputs, &AtomicBool),
     mut done: impl FnMut(Point) -> Result<()>,
 ) -> Result<bool> {
     say!("{METHOD}");
@@ -64,7 +65,7 @@ pub(super) fn points(
     train::keep_points(capture, folder);
     let photograph = views_of(capture, Split::Test)?[0].photograph()?;
     keep_picture(folder, "photograph", || Ok(photograph.image.clone()))?;
-    if !train::explicit::trained(config, capture, stop)? {
+    if !train::explicit::trained(config, capture, outputs, stop)? {
         return Ok(false);
     }
     let bytes = std::fs::read(&config.output)?;

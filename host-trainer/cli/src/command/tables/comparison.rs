@@ -1,9 +1,9 @@
 //! Published results and ours in one page, as papers of this field have it.
 
-use super::curves::{Group, SceneCurves};
+use super::curves::Group;
 use super::published::{PublishedRow, scenes_of};
 use super::survey::means;
-use crate::plot::ResultRow;
+use crate::plot::{ResultRow, unique};
 
 /// What stands where a plan has no runs.
 const NOT_RUN: &str = "not run";
@@ -12,12 +12,8 @@ const NOT_GIVEN: &str = "–";
 
 /// A page with a table of datasets, and one of scenes.
 pub(super) fn markdown(groups: &[Group<'_>], published: &[PublishedRow]) -> String {
-    let mut datasets: Vec<&str> = Vec::new();
-    for name in published.iter().map(|row| row.dataset.as_str()).chain(groups.iter().map(|group| group.dataset)) {
-        if !datasets.contains(&name) {
-            datasets.push(name);
-        }
-    }
+    let theirs = published.iter().map(|row| row.dataset.as_str());
+    let datasets = unique(theirs.chain(groups.iter().map(|group| group.dataset)));
     let mut page =
         "# Published results and ours\n\nPSNR, dB / SSIM / LPIPS / MB (10⁶ bytes). Ours are means over seeds; the \
                     sizes of our images stand beside our methods.\n\n## Datasets\n\n"
@@ -40,13 +36,8 @@ pub(super) fn markdown(groups: &[Group<'_>], published: &[PublishedRow]) -> Stri
 fn scenes(dataset: &str, groups: &[Group<'_>], published: &[PublishedRow]) -> String {
     let here = || published.iter().filter(|row| row.dataset == dataset && !row.scene.is_empty());
     let own = || groups.iter().filter(|group| group.dataset == dataset);
-    let mut names: Vec<&str> = Vec::new();
-    for name in here().map(|row| row.scene.as_str()).chain(own().flat_map(|group| group.scenes.iter().map(|s| s.name)))
-    {
-        if !names.contains(&name) {
-            names.push(name);
-        }
-    }
+    let own_scenes = own().flat_map(|group| group.scenes.iter().map(|scene| scene.name));
+    let names = unique(here().map(|row| row.scene.as_str()).chain(own_scenes));
     if names.is_empty() {
         return String::new();
     }
@@ -85,18 +76,12 @@ fn ours_on_datasets(
 
 /// A method of ours over the scenes of its dataset, a line for each rate.
 fn ours_on_scenes(group: &Group<'_>, method: &str, names: &[&str]) -> Vec<(String, Vec<String>)> {
-    let curve = |scene: &'_ SceneCurves<'_>| scene.methods.iter().position(|curve| curve.method == method);
-    let mut rates: Vec<&str> = Vec::new();
-    for scene in &group.scenes {
-        for rate in curve(scene).into_iter().flat_map(|i| &scene.methods[i].rates) {
-            if !rates.contains(&rate.name) {
-                rates.push(rate.name);
-            }
-        }
-    }
+    let curves = group.scenes.iter().flat_map(|scene| &scene.methods).filter(|curve| curve.method == method);
+    let rates = unique(curves.flat_map(|curve| &curve.rates).map(|rate| rate.name));
     let cell = |name: &str, rate: &str| {
         let scene = group.scenes.iter().find(|scene| scene.name == name)?;
-        let rate = scene.methods[curve(scene)?].rates.iter().find(|other| other.name == rate)?;
+        let curve = scene.methods.iter().find(|curve| curve.method == method)?;
+        let rate = curve.rates.iter().find(|other| other.name == rate)?;
         let row = rate.mean()?;
         Some(figures(row.psnr_db, row.ssim, row.lpips, Some(row.size_bytes)))
     };

@@ -4,7 +4,7 @@ use pocketsplat_metrics::RatePoint;
 
 use super::finished::FinishedRun;
 use crate::command::workflow::{Place, Plan};
-use crate::plot::ResultRow;
+use crate::plot::{ResultRow, unique};
 use crate::program;
 
 /// A dataset at one size of its images.
@@ -91,13 +91,7 @@ impl Group<'_> {
 
     /// The methods of the plan, in its order.
     pub(super) fn methods(&self) -> Vec<&str> {
-        let mut all = Vec::new();
-        for curve in self.scenes.iter().flat_map(|scene| &scene.methods) {
-            if !all.contains(&curve.method) {
-                all.push(curve.method);
-            }
-        }
-        all
+        unique(self.scenes.iter().flat_map(|scene| &scene.methods).map(|curve| curve.method))
     }
 }
 

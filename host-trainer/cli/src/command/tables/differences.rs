@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use super::curves::{Curve, Group, SceneCurves};
 use super::finished::rounded;
+use crate::plot::unique;
 
 /// The scene of a mean over all.
 const ALL: &str = "mean of all";
@@ -38,12 +39,7 @@ pub(super) fn of_group<'a>(group: &Group<'a>) -> Vec<BdRateLine<'a>> {
     let scenes = group.scenes.iter().flat_map(|scene| of_scene(group, scene));
     let mut lines: Vec<BdRateLine<'_>> = scenes.collect();
     if group.scenes.len() > 1 {
-        let mut methods: Vec<&str> = Vec::new();
-        for line in &lines {
-            if !methods.contains(&line.method) {
-                methods.push(line.method);
-            }
-        }
+        let methods = unique(lines.iter().map(|line| line.method));
         let means: Vec<_> = methods.into_iter().filter_map(|method| mean(group, method, &lines)).collect();
         lines.extend(means);
     }

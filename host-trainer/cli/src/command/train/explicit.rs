@@ -83,10 +83,11 @@ pub(super) fn begin(args: &Args) -> Result<ExitCode> {
     let format = format_of(&config)?;
     let path = args.run_folder(args.named_paths(&config.dataset, &config.output).1)?;
     let output = args.output(&source_of(&config), &config.output, gaussians(format), &path)?;
-    RunFolder::check(&path, args.overwrite())?;
+    RunFolder::check(&path, args.overwrite.is_given())?;
+    args.refuse_other_capture(&path, &config.dataset)?;
     // Before the run's files are touched: a capture that does not load must not cost an earlier run its results.
     let capture = load(&config, &path)?;
-    let folder = RunFolder::start(&path, &config.to_toml()?, args.overwrite())?;
+    let folder = RunFolder::start(&path, &config.to_toml()?, args.overwrite.is_given())?;
     let trainer = CloudTrainer::new(&capture, config.gaussians)?;
     let code = train(args, folder, &config, &capture, trainer, &output)?;
     drop(capture);
@@ -144,7 +145,12 @@ fn load(config: &ExplicitRunConfig, run: &Path) -> Result<Capture> {
 ///
 /// # Errors
 /// Another process works in the folder, or the run in it is not the one that is asked for.
-pub(crate) fn trained(config: &ExplicitRunConfig, capture: &Capture, stop: &AtomicBool) -> Result<bool> {
+pub(crate) fn trained(
+    config: &ExplicitRunConfig,
+    capture: &Capture,
+    outputs: Outputs,
+    stop: &AtomicBool,
+) -> Result<bool> {
     let path = RunFolder::beside(&config.output);
     let (folder, trainer) = match RunFolder::reopen(&path) {
         Ok(folder) => {
@@ -165,8 +171,7 @@ pub(crate) fn trained(config: &ExplicitRunConfig, capture: &Capture, stop: &Atom
         }
         Err(error) => return Err(error.into()),
     };
-    let output =
-        Outputs::new(true).reading_folder(&config.dataset).file(&config.output, gaussians(format_of(config)?))?;
+    let output = outputs.reading_folder(&config.dataset).file(&config.output, gaussians(format_of(config)?))?;
     Ok(train_in(folder, config, capture, trainer, (stop, GoesOn::SameCommand), &output)?.is_some())
 }
 
@@ -196,12 +201,12 @@ fn train(
     // Not before: until here there is nothing to keep, and Ctrl-C may end the process at once.
     let stop = stop::flag()?;
     let Some(result) =
-        train_in(folder, config, capture, trainer, (&stop, GoesOn::Resume(args.device_choice())), output)?
+        train_in(folder, config, capture, trainer, (&stop, GoesOn::Resume(args.trainer.trains_on)), output)?
     else {
         return Ok(ExitCode::from(stop::INTERRUPTED));
     };
     let (_, path) = args.named_paths(&config.dataset, &config.output);
-    print_or(&result, args.json(), result.summary(path))?;
+    print_or(&result, args.json, result.summary(path))?;
     if output.is_file() {
         let behind = if result.background == Background::White.to_string() { " --background white" } else { "" };
         let bundle = unused(Path::new("scene.psb"));

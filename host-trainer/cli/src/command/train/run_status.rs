@@ -7,6 +7,7 @@ use pocketsplat_trainer::train::run::{RunError, RunFolder};
 
 use super::in_folder::IN_RUN_AND_ON_COMMAND_LINE;
 use crate::config::RunConfig;
+use crate::say::say;
 
 /// Where the run that is asked for stands.
 pub(crate) enum RunStatus {
@@ -35,8 +36,14 @@ impl RunStatus {
                 refuse_other(&RunConfig::of_run(path)?, config, path)?;
                 Ok(Self::Finished)
             }
-            // Finished without its bundle: somebody removed it.
-            Err(RunError::NoRun { .. } | RunError::Finished { .. }) => {
+            Err(error @ (RunError::NoRun { .. } | RunError::Finished { .. })) => {
+                if matches!(error, RunError::Finished { .. }) {
+                    say!(
+                        "warning: the run in {} is finished, and its bundle {} is not there: it is trained anew",
+                        path.display(),
+                        config.output.display()
+                    );
+                }
                 Ok(Self::New(RunFolder::start(path, &config.to_toml()?, false)?))
             }
             Err(error) => Err(error.into()),
